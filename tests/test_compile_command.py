@@ -9,7 +9,7 @@ import pytest
 
 from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
-from a7sim.session.compiling import WITHIN_HALF
+from a7sim.session.compiling import HALF_INTERVAL_FACTOR
 from tests.support.processes import a7sim_in_process
 
 SEED = 1985
@@ -90,7 +90,7 @@ def test_the_errors_in_the_results_are_those_of_the_map_beside_the_true_ground(f
     assert all((places[2] == HEIGHT).all() for places in contours)
     assert beside["rms_height_m"] == pytest.approx(rms(errors), abs=2e-4)
     assert beside["largest_m"] == pytest.approx(np.abs(errors).max(), abs=2e-3)
-    assert beside["smallest_interval_m"] == pytest.approx(WITHIN_HALF * rms(errors), abs=1e-3)
+    assert beside["smallest_interval_m"] == pytest.approx(HALF_INTERVAL_FACTOR * rms(errors), abs=1e-3)
     assert beside["rms_height_m"] < 0.15, "docs/compilation.md: 0.07 m"
     off = {each["name"]: each for each in results["lines"] if each["kind"] != "contour"}
     for name, places in (*drawn(features, "road"), *drawn(features, "track")):

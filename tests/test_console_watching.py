@@ -161,7 +161,7 @@ def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> 
     scenario = load_scenario("akwanga")
     with Journal().recording(tmp_path, make_header("serve", scenario, 7), None):
         pass
-    with pytest.raises(A7SimError, match="expected a session in which something was said, got none"):
+    with pytest.raises(A7SimError, match="expected a session with lines on the link, got none"):
         open_recording(str(tmp_path))
 
 

@@ -517,7 +517,7 @@ def test_calibrate_prints_what_a_service_engineer_would_file():
         "left projector",
         "right projector",
         "µm at photo scale",
-        "held, since one level does not tell them from c, x0 and y0: bx, by, bz",
+        "held, because one level does not separate them from c, x0 and y0: bx, by, bz",
     ):
         assert each in words
 

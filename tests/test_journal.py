@@ -219,7 +219,7 @@ def test_a_journal_of_another_seed_is_refused_at_its_line(copied):
     header = make_header("run", load_scenario("dewitt-pair", LIGHT), 8).line
     (copied / "session.jsonl").write_bytes(forged(journalled, header))
     first = next(n for n in range(2, len(journalled)) if "FID?" in journalled.event(n).text) + 1
-    with pytest.raises(A7SimError, match=rf"session\.jsonl, line {first}: expected what this session does again"):
+    with pytest.raises(A7SimError, match=rf"session\.jsonl, line {first}: expected this session's event"):
         resumed(copied)
 
 
@@ -469,7 +469,7 @@ def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypat
 def synced(tmp_path, monkeypatch, durability, lines, waits=False):
     """Return how often the file was brought to the disk by lines that register (True) or not, before it was closed."""
     times = []
-    monkeypatch.setattr(append_file, "_on_disk", lambda handle: times.append(time.monotonic()))
+    monkeypatch.setattr(append_file, "_flush", lambda handle: times.append(time.monotonic()))
     file = AppendOnlyFile(tmp_path / "f", durability)
     began = time.monotonic()
     for registers in lines:

@@ -52,7 +52,7 @@ def connect(
         raise A7SimError(
             "connect: expected no token beside a scenario, since an instrument in this process asks for none"
         )
-    instrument = SharedInstrument(Autograph.from_scenario(*_chosen(to, seed)))
+    instrument = SharedInstrument(Autograph.from_scenario(*_resolve(to, seed)))
     return Client(InProcessSerial(instrument=instrument, timeout=timeout))
 
 
@@ -69,7 +69,7 @@ class Operator:
     """
 
     def __init__(self, scenario: Name | Scenario, seed: int | None = None) -> None:
-        self.scenario, self.seed = _chosen(scenario, seed)
+        self.scenario, self.seed = _resolve(scenario, seed)
 
     def run(
         self,
@@ -94,8 +94,8 @@ class Operator:
             ways = ", ".join(self.scenario.work)
             raise A7SimError(f"{self.scenario.title}: expected work at the plotter for the operator, got {ways}")
         with open_checked_port(link, timeout, token) as served:
-            adapted = replace(options, port_adapter=lambda twin: TwinCheckedPort(served, twin, link))
-            return run_all_methods(self.scenario, self.seed, adapted)
+            linked = replace(options, port_adapter=lambda twin: TwinCheckedPort(served, twin, link))
+            return run_all_methods(self.scenario, self.seed, linked)
 
     work = RenamedMember("run")
 
@@ -136,6 +136,6 @@ class Study:
     laid = RenamedMember("loaded")
 
 
-def _chosen(scenario: Name | Scenario, seed: int | None) -> tuple[Scenario, int]:
+def _resolve(scenario: Name | Scenario, seed: int | None) -> tuple[Scenario, int]:
     loaded = scenario if isinstance(scenario, Scenario) else Scenario.load(scenario)
     return loaded, loaded.seed if seed is None else seed

@@ -53,12 +53,12 @@ def statistics_document(adjustment: Adjustment, names: Sequence[str], observatio
     }
 
 
-def similarity_document(found: Similarity) -> Document:
+def similarity_document(similarity: Similarity) -> Document:
     """Return scale, rotation and translation."""
     return {
-        "scale": float(found.scale),
-        "rotation": found.rotation.tolist(),
-        "translation": found.translation.tolist(),
+        "scale": float(similarity.scale),
+        "rotation": similarity.rotation.tolist(),
+        "translation": similarity.translation.tolist(),
     }
 
 
@@ -87,16 +87,16 @@ def absolute_document(oriented: AbsoluteOrientation) -> Document:
 
 def adjustment_document(adjusted: StripAdjustment) -> Document:
     """Return a polynomial adjustment: its residuals and the deformation of the strip."""
-    found = adjusted.deformation
+    deformation = adjusted.deformation
     return {
         "degree": adjusted.degree,
         "s0_plan": float(adjusted.plan.s0),
         "s0_height": float(adjusted.height.s0),
         "deformation": {
-            "scale_drift_ppm_per_km": 1e9 * float(found.scale_drift),
-            "horizontal_sag_m": float(found.horizontal_sag),
-            "vertical_sag_m": float(found.vertical_sag),
-            "twist_gon_per_km": 1e3 * float(found.twist) / GON,
+            "scale_drift_ppm_per_km": 1e9 * float(deformation.scale_drift),
+            "horizontal_sag_m": float(deformation.horizontal_sag),
+            "vertical_sag_m": float(deformation.vertical_sag),
+            "twist_gon_per_km": 1e3 * float(deformation.twist) / GON,
         },
         "residuals_m": residuals_document(adjusted.fit),
         "accuracy_m": accuracy_document(adjusted.fit),
@@ -106,7 +106,7 @@ def adjustment_document(adjusted: StripAdjustment) -> Document:
 def residuals_document(fit: GroundFit) -> Document:
     """Return computed minus given at each ground point, with its role; null where nothing is given."""
     return {
-        point: {"role": role} | {axis: _known(value) for axis, value in zip("XYZ", residual, strict=True)}
+        point: {"role": role} | {axis: _finite_or_none(value) for axis, value in zip("XYZ", residual, strict=True)}
         for point, role, residual in zip(fit.ground.points, fit.ground.roles, fit.residuals.T.tolist(), strict=True)
     }
 
@@ -114,23 +114,23 @@ def residuals_document(fit: GroundFit) -> Document:
 def accuracy_document(fit: GroundFit) -> Document:
     """Return rms and largest residuals at control and at checks; `plan` is the rms distance in plan."""
     return {
-        which: differences_document(residuals)
-        for which, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
+        group: differences_document(residuals)
+        for group, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
         if np.isfinite(residuals).any()
     }
 
 
 def differences_document(residuals: Array) -> Document:
     """Return rms and largest of differences ``(3, n)`` in X, Y and Z, nan left out."""
-    rms, most = root_mean_square(residuals), max_abs_residual(residuals)
+    rms, largest = root_mean_square(residuals), max_abs_residual(residuals)
     return {
         "points": int(np.isfinite(residuals).any(axis=0).sum()),
-        "rms": {axis: _known(float(value)) for axis, value in zip("XYZ", rms, strict=True)},
-        "plan": _known(float(np.hypot(rms[0], rms[1]))),
-        "height": _known(float(rms[2])),
-        "largest": {axis: _known(float(value)) for axis, value in zip("XYZ", most, strict=True)},
+        "rms": {axis: _finite_or_none(float(value)) for axis, value in zip("XYZ", rms, strict=True)},
+        "plan": _finite_or_none(float(np.hypot(rms[0], rms[1]))),
+        "height": _finite_or_none(float(rms[2])),
+        "largest": {axis: _finite_or_none(float(value)) for axis, value in zip("XYZ", largest, strict=True)},
     }
 
 
-def _known(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return value if np.isfinite(value) else None

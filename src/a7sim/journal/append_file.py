@@ -17,7 +17,7 @@ DURABILITIES: tuple[Durability, ...] = get_args(Durability)
 SYNCED_WITHIN_S = 0.2
 """Wall-clock s within which all lines are on disk, except for 'none'."""
 
-_on_disk = getattr(os, "fdatasync", os.fsync)
+_flush = getattr(os, "fdatasync", os.fsync)
 
 
 class JournalWriteError(A7SimError):
@@ -44,7 +44,7 @@ class AppendOnlyFile:
             raise A7SimError(f"{path}: expected a session that is over, got one that is being written") from error
         except OSError as error:
             raise A7SimError(f"{path}: expected a journal that can be written: {error.strerror}") from error
-        self._syncing = threading.Thread(target=self._sync_now_and_then, name="journal", daemon=True)
+        self._syncing = threading.Thread(target=self._sync_periodically, name="journal", daemon=True)
         if durability == "records":
             self._syncing.start()
 
@@ -61,11 +61,11 @@ class AppendOnlyFile:
                 written += os.write(self._file, line[written:])
             self._size += written
             if self._durability == "always" or (at_once and self._durability == "records"):
-                _on_disk(self._file)
+                _flush(self._file)
             elif not self._pending.is_set():
                 self._pending.set()
         except OSError as error:
-            raise self._failed(error) from error
+            raise self._fail(error) from error
 
     def close(self) -> None:
         """Flush everything to disk and close the file."""
@@ -79,7 +79,7 @@ class AppendOnlyFile:
         if self._error is not None:
             raise self._error
 
-    def _sync_now_and_then(self) -> None:
+    def _sync_periodically(self) -> None:
         while not self._closing.is_set():
             self._pending.wait()
             self._closing.wait(SYNCED_WITHIN_S / 2.0)
@@ -88,11 +88,11 @@ class AppendOnlyFile:
 
     def _sync(self) -> None:
         try:
-            _on_disk(self._file)
+            _flush(self._file)
         except OSError as error:
-            self._failed(error)
+            self._fail(error)
 
-    def _failed(self, error: OSError) -> JournalWriteError:
+    def _fail(self, error: OSError) -> JournalWriteError:
         self._error = write_failure_message(self._path, error)
         with suppress(OSError):
             os.ftruncate(self._file, self._size)

@@ -62,10 +62,10 @@ class StateDifference:
     after: Any
 
 
-def differences(was: Any, is_now: Any, part: str = "") -> Iterator[StateDifference]:
+def differences(earlier: Any, later: Any, part: str = "") -> Iterator[StateDifference]:
     """Yield the parts in which two states differ."""
-    if isinstance(was, dict) and isinstance(is_now, dict):
-        for key in [*was, *(key for key in is_now if key not in was)]:
-            yield from differences(was.get(key), is_now.get(key), f"{part}.{key}" if part else key)
-    elif was != is_now:
-        yield StateDifference(part, was, is_now)
+    if isinstance(earlier, dict) and isinstance(later, dict):
+        for key in [*earlier, *(key for key in later if key not in earlier)]:
+            yield from differences(earlier.get(key), later.get(key), f"{part}.{key}" if part else key)
+    elif earlier != later:
+        yield StateDifference(part, earlier, later)

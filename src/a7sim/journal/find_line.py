@@ -14,15 +14,15 @@ def find_line(journalled: JournalFile, words: str) -> int | None:
     found: int | None = None
     if words.startswith("@") and words[1:].isdecimal():
         found = int(words[1:])
-    elif time_there := _TIME.fullmatch(words):
-        hours, minutes, seconds = (float(each or 0) for each in time_there.groups())
+    elif time_match := _TIME.fullmatch(words):
+        hours, minutes, seconds = (float(each or 0) for each in time_match.groups())
         at = 3600.0 * hours + 60.0 * minutes + seconds
         found = 2 + bisect_left(numbers, at, key=lambda number: journalled.event(number).t)
     else:
-        notes = (n for n in numbers if _notes(journalled.event(n).text, words))
+        notes = (n for n in numbers if _is_note(journalled.event(n).text, words))
         found = next(notes, None)
     return found if found is not None and found in numbers else None
 
 
-def _notes(text: str, wanted: str) -> bool:
-    return text.upper().startswith("NOTE") and wanted.lower() in text.lower()
+def _is_note(text: str, words_of_note: str) -> bool:
+    return text.upper().startswith("NOTE") and words_of_note.lower() in text.lower()

@@ -15,7 +15,7 @@ READABLE_VERSIONS = (2, 3)
 """Schema versions that are read; version 2 had the whole scenario in its header."""
 
 _END_OF_LINE = b',"crc":"%08x"}'
-_LENGTH_OF_END = len(_END_OF_LINE % 0)
+_END_LENGTH = len(_END_OF_LINE % 0)
 
 
 class Event(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -56,8 +56,8 @@ class ChecksumChain:
 
     def accepts(self, line: bytes) -> bool:
         """Return whether a line is the next one; if so the chain advances."""
-        crc = zlib.crc32(line[:-_LENGTH_OF_END], self.crc)
-        if line[-_LENGTH_OF_END:] != _END_OF_LINE % crc:
+        crc = zlib.crc32(line[:-_END_LENGTH], self.crc)
+        if line[-_END_LENGTH:] != _END_OF_LINE % crc:
             return False
         self.crc = crc
         return True
@@ -104,19 +104,19 @@ def read_journal(path: Path) -> JournalFile:
         data = path.read_bytes()
     except OSError as error:
         raise A7SimError(f"{path}: expected the journal of a session: {error.strerror}") from error
-    *lines, torn = data.split(b"\n")
+    *lines, tail = data.split(b"\n")
     chain = ChecksumChain()
     for number, line in enumerate(lines, start=1):
         if not chain.accepts(line):
-            raise A7SimError(f"{path}, line {number}: {_damage(line, number)}")
+            raise A7SimError(f"{path}, line {number}: {_damage_message(line, number)}")
     crc = chain.crc
     if not lines:
         raise A7SimError(f"{path}: expected the journal of a session, got no whole line: nothing was observed yet")
-    if chain.accepts(torn[:-1]):
+    if chain.accepts(tail[:-1]):
         raise A7SimError(
             f"{path}, line {len(lines) + 1}: expected a line end, got another byte: the journal is damaged"
         )
-    return JournalFile(path, _header(path, lines[0]), lines, torn, crc)
+    return JournalFile(path, _header(path, lines[0]), lines, tail, crc)
 
 
 def has_header(path: Path) -> bool:
@@ -131,22 +131,22 @@ def has_header(path: Path) -> bool:
 def _header(path: Path, line: bytes) -> dict[str, Any]:
     header = msgspec.json.decode(line)
     if header.get("schema_version") not in READABLE_VERSIONS:
-        raise A7SimError(f"{path}, line 1: {_other_version(header)}")
+        raise A7SimError(f"{path}, line 1: {_version_message(header)}")
     return dict(header)
 
 
-def _damage(line: bytes, number: int) -> str:
+def _damage_message(line: bytes, number: int) -> str:
     if number == 1:
         try:
             header = msgspec.json.decode(line)
         except (msgspec.DecodeError, UnicodeDecodeError):
             header = None
         if isinstance(header, dict) and header.get("schema_version", SCHEMA_VERSION) not in READABLE_VERSIONS:
-            return _other_version(header)
+            return _version_message(header)
     return "expected the checksum that follows from the lines before and this one, got another: the journal is damaged"
 
 
-def _other_version(header: dict[str, Any]) -> str:
+def _version_message(header: dict[str, Any]) -> str:
     return (
         f"expected a journal of schema_version {' or '.join(map(str, READABLE_VERSIONS))}, "
         f"got {header['schema_version']!r}: this version of a7sim cannot replay or resume it"

@@ -32,18 +32,18 @@ class InteractiveSession:
         self._scenario, self._seed = scenario, seed
         self._journal = Journal(JournalOptions(resumes=begun is not None))
         self._instrument: SharedInstrument | None = None
-        self._held = False
+        self._locked = False
 
     def open(self) -> Client:
         """Return a client of the instrument. Raises A7SimError if the journal cannot be written or continued."""
         if self._instrument is None:
-            self._instrument = self._anew() if self.begun is None else self._again(self.begun)
+            self._instrument = self._start() if self.begun is None else self._resume(self.begun)
         client = Client(InProcessSerial(instrument=self._instrument, clock=self.clock, timeout=TIMEOUT_S))
-        if self._held:
+        if self._locked:
             client.ask("SYST:LOCK:REQ?")
         return client
 
-    def _anew(self) -> SharedInstrument:
+    def _start(self) -> SharedInstrument:
         scenario, seed = self._scenario, self._seed
         instrument = SharedInstrument(
             build_autograph(scenario.instrument, build_scene(scenario, seed).mountable, seed),
@@ -53,10 +53,10 @@ class InteractiveSession:
         self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), instrument)
         return instrument
 
-    def _again(self, begun: ResumableSession) -> SharedInstrument:
-        instrument, now, held_by = restore_instrument(begun, self._journal, from_checkpoint=True)
-        self.clock.advance_to(now)
-        self._held = held_by is not None
+    def _resume(self, begun: ResumableSession) -> SharedInstrument:
+        instrument, time, lock_holder = restore_instrument(begun, self._journal, from_checkpoint=True)
+        self.clock.advance_to(time)
+        self._locked = lock_holder is not None
         return instrument
 
     def history(self) -> Iterator[Event]:

@@ -22,9 +22,9 @@ from a7sim.link.client.ports import TIMEOUT_S
 from a7sim.link.inprocess import InProcessSerial
 from a7sim.scenario import Scenario
 
-_EXCHANGED = (">", "!")
+_SENT_DIRECTIONS = (">", "!")
 
-_DRAWS = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
+_SCREEN_QUERY = re.compile(r"EYEP\w*:PICT\w*\?|COUN\?;:PROJ1:", re.IGNORECASE)
 """Line that draws a screen: it is replayed, and is not a step."""
 
 _POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"', re.IGNORECASE)
@@ -32,7 +32,7 @@ _POINT = re.compile(r'(?:EYEP\w*(?::STER\w*)?\?|REC(?:ORD)?)\s+"((?:[^"]|"")+)"'
 MAX_REPLAYED_LINES = 200
 """Number of lines that are replayed rather than seeking a later checkpoint."""
 
-_LOOKED_BACK = 200
+_MAX_STEPS_BACK = 200
 """Steps searched backwards for the current point."""
 
 
@@ -71,19 +71,19 @@ class Recording:
         self._records: list[int] = []
         self._checkpoints: list[int] = []
         for number in range(2, len(journalled) + 1):
-            self._list(number, journalled.event(number))
+            self._add_line(number, journalled.event(number))
         if not self._numbers:
-            raise A7SimError(f"{journalled.path}: expected a session in which something was said, got none")
+            raise A7SimError(f"{journalled.path}: expected a session with lines on the link, got none")
         self._replay = Replay(journalled, scenario)
         self._front = SharedInstrument(self._replay.instrument.autograph)
         self._next = 2
         self._error = ""
-        self.frame = self._framed(0)
+        self.frame = self._make_frame(0)
 
-    def _list(self, number: int, event: Event) -> None:
+    def _add_line(self, number: int, event: Event) -> None:
         if event.kind == "state":
             self._checkpoints.append(number)
-        elif event.dir in _EXCHANGED and not _DRAWS.match(event.text):
+        elif event.dir in _SENT_DIRECTIONS and not _SCREEN_QUERY.match(event.text):
             self._numbers.append(number)
             self._times.append(event.t)
             if is_registration(event.text):
@@ -101,7 +101,7 @@ class Recording:
     def seek(self, step: int) -> Frame:
         """Move forwards or backwards until a step is complete; 0 is the start."""
         end = self._numbers[step] if step < self.steps else len(self.journalled) + 1
-        if self._leaps_to(end):
+        if self._is_seek_faster(end):
             self._replay = Replay(self.journalled, self._scenario)
             self._next = self._replay.seek(end)
             self._front.autograph = self._replay.instrument.autograph
@@ -111,20 +111,20 @@ class Recording:
                 expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
                 self._error = f"{self.journalled.location(difference.line)}: expected again {expected}, got {got}"
             self._next += 1
-        self.frame = self._framed(step)
+        self.frame = self._make_frame(step)
         return self.frame
 
-    def _leaps_to(self, end: int) -> bool:
+    def _is_seek_faster(self, end: int) -> bool:
         """Return whether continuing from a checkpoint is faster than from here."""
-        at = bisect_left(self._checkpoints, end) - 1
-        return end < self._next or (at >= 0 and self._checkpoints[at] - self._next > MAX_REPLAYED_LINES)
+        index = bisect_left(self._checkpoints, end) - 1
+        return end < self._next or (index >= 0 and self._checkpoints[index] - self._next > MAX_REPLAYED_LINES)
 
-    def advance_until(self, enough: Callable[[], bool]) -> Frame:
+    def advance_until(self, is_enough: Callable[[], bool]) -> Frame:
         """Move forwards, at least one step if possible, until the predicate is true."""
         frame = self.frame
         while frame.step < self.steps:
             frame = self.seek(frame.step + 1)
-            if enough():
+            if is_enough():
                 break
         return frame
 
@@ -132,10 +132,10 @@ class Recording:
         """Return the last step completed by a simulated time in s."""
         return bisect_right(self._times, time)
 
-    def next_record(self, step: int, way: int) -> int | None:
+    def next_record(self, step: int, direction: int) -> int | None:
         """Return the next step in a direction with a registration or a strike; None if there is none."""
-        at = bisect_right(self._records, step) if way > 0 else bisect_left(self._records, step) - 1
-        return self._records[at] if 0 <= at < len(self._records) else None
+        index = bisect_right(self._records, step) if direction > 0 else bisect_left(self._records, step) - 1
+        return self._records[index] if 0 <= index < len(self._records) else None
 
     def find_step(self, words: str) -> int:
         """Return the step of a number, a time, @LINE or the text of a note. Raises A7SimError for anything else."""
@@ -150,7 +150,7 @@ class Recording:
         answers = self.journalled.event(line).dir == "<"
         return min(bisect_left(self._numbers, line) + (not answers), self.steps)
 
-    def _framed(self, step: int) -> Frame:
+    def _make_frame(self, step: int) -> Frame:
         scales = self._front.autograph.counter_scales
         line_text = ""
         if step:
@@ -167,10 +167,10 @@ class Recording:
         )
 
     def _point_at(self, step: int) -> str | None:
-        for number in reversed(self._numbers[max(0, step - _LOOKED_BACK) : step]):
-            named = _POINT.findall(self.journalled.event(number).text)
-            if named:
-                return str(named[-1]).replace('""', '"')
+        for number in reversed(self._numbers[max(0, step - _MAX_STEPS_BACK) : step]):
+            names = _POINT.findall(self.journalled.event(number).text)
+            if names:
+                return str(names[-1]).replace('""', '"')
         return None
 
 
@@ -180,16 +180,16 @@ def open_recording(session: str) -> Recording:
     if path.is_dir():
         return Recording(read_journal(path / JOURNAL))
     if session.endswith(SUFFIX) or not path.exists():
-        return _played(find_script(session))
+        return _record_script(find_script(session))
     return Recording(read_journal(path))
 
 
-def _played(file: Path) -> Recording:
+def _record_script(file: Path) -> Recording:
     """Return the recording of a script run to its end, or to its first failed expectation."""
     script = read_script(file)
-    heard: list[LinkEvent] = []
-    ScriptRunner(script, heard.append).run()
+    events: list[LinkEvent] = []
+    ScriptRunner(script, events.append).run()
     chain = ChecksumChain()
     header = chain.line(make_header("replay", script.scenario, script.seed, script=file.name).line)
-    lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in heard]
+    lines = [chain.line(Event(each.time, each.client, each.direction, each.text)) for each in events]
     return Recording(JournalFile(file, msgspec.json.decode(header), [header, *lines], b"", chain.crc), script.scenario)

@@ -34,7 +34,7 @@ def scenario_of_journal(journalled: JournalFile, known: Scenario | None = None) 
         raise A7SimError(
             f"{journalled.location(1)}: expected a session whose scenario is known, got one that names none"
         )
-    scenario = known or _scenario_beside(journalled)
+    scenario = known or _read_scenario(journalled)
     try:
         found = hash_scenario(scenario)
     except A7SimError as error:
@@ -52,12 +52,12 @@ def knows_scenario(journalled: JournalFile) -> bool:
     return journalled.header.get("scenario_hash") is not None
 
 
-def _scenario_beside(journalled: JournalFile) -> Scenario:
+def _read_scenario(journalled: JournalFile) -> Scenario:
     """Return the scenario of a journal, which in version 2 is in its header. Raises A7SimError if there is none."""
-    path, where = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.location(1)
+    path, location = journalled.path.with_suffix(SCENARIO_SUFFIX), journalled.location(1)
     data = journalled.header.get("scenario")
     if data is None:
-        where = str(path)
+        location = str(path)
         try:
             data = msgspec.json.decode(path.read_bytes())
         except OSError as error:
@@ -66,8 +66,8 @@ def _scenario_beside(journalled: JournalFile) -> Scenario:
             raise A7SimError(f"{path}: expected the scenario of the session as JSON, got something else") from error
     try:
         return from_data(data)
-    except A7SimError as mistake:
-        raise A7SimError(f"{where}: {mistake}") from mistake
+    except A7SimError as error:
+        raise A7SimError(f"{location}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -94,12 +94,12 @@ class Replay:
         settings = header.get("settings", {})
         if autograph is None:
             scenario, seed = scenario_of_journal(journalled, known)
-            drawer = build_scene(scenario, seed, header.get("pictures", 1)).mountable
-            autograph = build_autograph(scenario.instrument, drawer, seed)
+            photographs = build_scene(scenario, seed, header.get("pictures", 1)).mountable
+            autograph = build_autograph(scenario.instrument, photographs, seed)
         self.journalled = journalled
         self.instrument = SharedInstrument(
             autograph,
-            self._heard,
+            self._on_link_event,
             TOKEN_PLACEHOLDER if settings.get("login") else None,
             0.0 if settings.get("realtime") else POLL_SECONDS,
             str(header.get("software", "")).removeprefix("a7sim "),
@@ -111,7 +111,7 @@ class Replay:
         self._replayed: deque[LinkEvent] = deque()
         self._changes = 0
 
-    def _heard(self, event: LinkEvent) -> None:
+    def _on_link_event(self, event: LinkEvent) -> None:
         if self._clock is None or event.direction == "<":
             self._replayed.append(event)
 
@@ -119,7 +119,7 @@ class Replay:
         """Move to the last checkpoint before a line with a known state; return the next line."""
         known: list[Checkpoint] = []
         for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
-            if checkpoint.line >= line or not self._is_of_the_journal(checkpoint):
+            if checkpoint.line >= line or not self._is_journalled(checkpoint):
                 break
             known.append(checkpoint)
         if not known:
@@ -133,7 +133,7 @@ class Replay:
         self.time = last.t
         return last.line + 1
 
-    def _is_of_the_journal(self, checkpoint: Checkpoint) -> bool:
+    def _is_journalled(self, checkpoint: Checkpoint) -> bool:
         number = checkpoint.line
         return 1 < number <= len(self.journalled) and self.journalled.event(number).hash == checkpoint.hash
 
@@ -141,54 +141,62 @@ class Replay:
         """Replay an event of the journal; return its difference, if any."""
         self.time = event.t
         if event.kind == "state":
-            return self._compared(number, event)
+            return self._compare_state(number, event)
         if event.kind:
             return None
         if self._clock is not None:
-            return self._say_as_recorded(number, event)
+            return self._apply_recorded(number, event)
         if event.dir != "<":
-            left = self._left_over(number)
-            self._happen(event)
-            if left is not None:
-                return left
-        return self._expected(number, event)
+            surplus = self._surplus_output(number)
+            self._feed(event)
+            if surplus is not None:
+                return surplus
+        return self._compare_event(number, event)
 
-    def _say_as_recorded(self, number: int, event: Event) -> ReplayDifference | None:
+    def _apply_recorded(self, number: int, event: Event) -> ReplayDifference | None:
         """Compare replies only, in their order: lines may have been sent before the replies arrived."""
         if event.dir == "<":
-            return self._expected(number, event)
+            return self._compare_event(number, event)
         if event.dir == "-":
             self._replayed.clear()
-        self._happen(event)
+        self._feed(event)
         return None
 
     def final_difference(self) -> ReplayDifference | None:
         """Return the instrument's further output at the end of the journal, if any."""
-        return self._left_over(len(self.journalled) + 1)
+        return self._surplus_output(len(self.journalled) + 1)
 
     def pending_events(self) -> list[LinkEvent]:
         """Return the instrument's further events at the end of the journal, which stopped before they were written."""
-        left = list(self._replayed)
+        surplus = list(self._replayed)
         self._replayed.clear()
-        return left
+        return surplus
 
-    def _left_over(self, number: int) -> ReplayDifference | None:
+    def _surplus_output(self, number: int) -> ReplayDifference | None:
         if not self._replayed:
             return None
-        exchanged = self._replayed.popleft()
+        replayed_event = self._replayed.popleft()
         self._replayed.clear()
-        return ReplayDifference(number, "", _shown(exchanged.client, exchanged.direction, exchanged.text))
+        return ReplayDifference(
+            number, "", _format_exchange(replayed_event.client, replayed_event.direction, replayed_event.text)
+        )
 
-    def _expected(self, number: int, event: Event) -> ReplayDifference | None:
-        exchanged = self._replayed.popleft() if self._replayed else None
-        if exchanged is not None:
-            same = (exchanged.direction, exchanged.text) == (event.dir, event.text)
-            if same and (self._clock is not None or (exchanged.time, exchanged.client) == (event.t, event.client)):
+    def _compare_event(self, number: int, event: Event) -> ReplayDifference | None:
+        replayed_event = self._replayed.popleft() if self._replayed else None
+        if replayed_event is not None:
+            same = (replayed_event.direction, replayed_event.text) == (event.dir, event.text)
+            if same and (
+                self._clock is not None or (replayed_event.time, replayed_event.client) == (event.t, event.client)
+            ):
                 return None
-        replayed = "" if exchanged is None else _shown(exchanged.client, exchanged.direction, exchanged.text)
-        return ReplayDifference(number, _shown(event.client, event.dir, event.text), replayed)
+        replayed = (
+            ""
+            if replayed_event is None
+            else _format_exchange(replayed_event.client, replayed_event.direction, replayed_event.text)
+        )
+        return ReplayDifference(number, _format_exchange(event.client, event.dir, event.text), replayed)
 
-    def _happen(self, event: Event) -> None:
+    def _feed(self, event: Event) -> None:
         instrument, client = self.instrument, event.client
         if event.dir == "+":
             instrument.open(client, time=event.t)
@@ -196,25 +204,25 @@ class Replay:
             instrument.close(client, event.t)
         elif client in instrument.clients:
             engine = instrument.clients[client]
-            received = _bytes_of(event)
+            received = _event_bytes(event)
             if self._clock is None:
                 engine.feed(received, event.t)
             else:
                 self._clock.advance_to(event.t)
                 feed_until_idle(engine, received, self._clock)
 
-    def _compared(self, number: int, event: Event) -> ReplayDifference | None:
+    def _compare_state(self, number: int, event: Event) -> ReplayDifference | None:
         state = self.instrument.state(self._changes)
         self._changes = len(self.instrument.autograph.recorder.changes)
         found = state_hash(state)
         self.checkpoints.append(Checkpoint(number, event.t, found, state))
         if found == event.hash:
             return None
-        return ReplayDifference(number, f"state {event.hash}", f"state {found}", self._parts(number, state))
+        return ReplayDifference(number, f"state {event.hash}", f"state {found}", self._state_parts(number, state))
 
-    def _parts(self, number: int, state: dict[str, Any]) -> tuple[StateDifference, ...]:
+    def _state_parts(self, number: int, state: dict[str, Any]) -> tuple[StateDifference, ...]:
         for checkpoint in read_checkpoints(self.journalled.path.with_name(STATES)):
-            if checkpoint.line == number and self._is_of_the_journal(checkpoint):
+            if checkpoint.line == number and self._is_journalled(checkpoint):
                 return tuple(differences(checkpoint.state, state))
         return ()
 
@@ -223,7 +231,7 @@ class Replay:
         for number in range(after + 1, len(self.journalled) + 1):
             event = self.journalled.event(number)
             if event.kind == "state":
-                return self._parts(number, self.instrument.state(self._changes))
+                return self._state_parts(number, self.instrument.state(self._changes))
             self.apply(number, event)
         return ()
 
@@ -235,7 +243,7 @@ def replay_lines(replay: Replay, first: int = 2) -> Iterator[tuple[int, Event, R
         yield number, event, replay.apply(number, event)
 
 
-def _bytes_of(event: Event) -> bytes:
+def _event_bytes(event: Event) -> bytes:
     if event.dir == "~":
         return b""
     if event.dir == "!":
@@ -243,5 +251,5 @@ def _bytes_of(event: Event) -> bytes:
     return event.text.encode("latin-1", "replace") + (b"\r\n" if event.text.endswith("\r") else b"\n")
 
 
-def _shown(client: str, direction: str, text: str) -> str:
+def _format_exchange(client: str, direction: str, text: str) -> str:
     return f"{client} {direction} {text}".rstrip()

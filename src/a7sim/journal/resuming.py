@@ -23,11 +23,11 @@ class ResumableSession:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Options beside the scenario, by name."""
+        """Options other than the scenario, by name."""
         return dict(self.journalled.header["settings"])
 
     def setting(self, name: str) -> Any:
-        """Return an option beside the scenario, None if it was not recorded."""
+        """Return an option other than the scenario, None if it was not recorded."""
         return self.settings.get(name)
 
 
@@ -64,17 +64,17 @@ def restore_instrument(begun: ResumableSession, journal: Journal, from_checkpoin
     first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
     for number, _, difference in replay_lines(replay, first):
         if difference is not None:
-            raise A7SimError(f"{begun.journalled.location(number)}: {_not_again(difference)}")
+            raise A7SimError(f"{begun.journalled.location(number)}: {_difference_message(difference)}")
     instrument = replay.instrument
     instrument.listener = journal.resume_at(begun.journalled, instrument, replay.checkpoints).on_link_event
     for event in replay.pending_events():
         journal.on_link_event(event)
-    held_by = instrument.lock_holder
+    lock_holder = instrument.lock_holder
     for client in [*instrument.clients]:
         instrument.close(client, replay.time)
-    return RestoredInstrument(instrument, replay.time, held_by)
+    return RestoredInstrument(instrument, replay.time, lock_holder)
 
 
-def _not_again(difference: ReplayDifference) -> str:
+def _difference_message(difference: ReplayDifference) -> str:
     expected, got = difference.journalled or "nothing", difference.replayed or "nothing"
-    return f"expected what the instrument does again, {got}, got another's, {expected}"
+    return f"expected the instrument's event, {got}, got another, {expected}"

@@ -36,56 +36,60 @@ class ScriptRunner:
     ) -> None:
         self._script = script
         self._clock = clock or Clock()
-        self.instrument = instrument or _fresh(script, listener)
+        self.instrument = instrument or _build_instrument(script, listener)
 
     def run(self, client: str | None = None) -> ExpectationFailed | None:
         """Run the statements up to the first that fails, and return that; an unexpected error is a failure."""
         engine = self.instrument.open(client, time=self._clock.now)
-        for done, after in zip(self._script.statements, [*self._script.statements[1:], None], strict=False):
-            failed = self._carry_out(engine, done)
-            if failed is None and not _asks_for_errors(after) and engine.errors:
-                failed = ExpectationFailed(done.place, f"{_line_of(done)} to be obeyed", engine.errors[0])
+        for statement, next_statement in zip(
+            self._script.statements, [*self._script.statements[1:], None], strict=False
+        ):
+            failed = self._execute(engine, statement)
+            if failed is None and not _is_error_query(next_statement) and engine.errors:
+                failed = ExpectationFailed(
+                    statement.place, f"{_statement_line(statement)} to be obeyed", engine.errors[0]
+                )
             if failed is not None:
                 return failed
         self.instrument.close(engine.client, self._clock.now)
         return None
 
-    def _carry_out(self, engine: Engine, statement: Statement) -> ExpectationFailed | None:
+    def _execute(self, engine: Engine, statement: Statement) -> ExpectationFailed | None:
         if isinstance(statement, Wait):
             self._clock.advance(statement.seconds)
             return None
-        reply = feed_until_idle(engine, _line_of(statement).encode("latin-1", "replace") + b"\n", self._clock)
+        reply = feed_until_idle(engine, _statement_line(statement).encode("latin-1", "replace") + b"\n", self._clock)
         if isinstance(statement, SendLine):
             return None
-        taken = parse_reply(reply)
-        answer = () if taken is None else tuple(field for part in taken.parts for field in _fields(part))
+        parsed = parse_reply(reply)
+        answer = () if parsed is None else tuple(field for part in parsed.parts for field in _fields(part))
         if statement.matches(answer):
             return None
         errors = f" ({engine.errors[0]})" if engine.errors else ""
         return ExpectationFailed(statement.place, str(statement), (", ".join(answer) or "no answer") + errors)
 
 
-def _fresh(script: Script, listener: Listener | None) -> SharedInstrument:
+def _build_instrument(script: Script, listener: Listener | None) -> SharedInstrument:
     scene = build_scene(script.scenario, script.seed)
     return SharedInstrument(build_autograph(script.scenario.instrument, scene.mountable, script.seed), listener)
 
 
-def _line_of(statement: Statement) -> str:
+def _statement_line(statement: Statement) -> str:
     if isinstance(statement, Wait):
         return f"wait {statement.seconds:g}"
     return (statement.query if isinstance(statement, Expect) else statement.text)[: MAX_LINE_LENGTH + 1]
 
 
-def _asks_for_errors(statement: Statement | None) -> bool:
+def _is_error_query(statement: Statement | None) -> bool:
     return isinstance(statement, Expect) and any(word in statement.query.upper() for word in ("ERR", "*ESR", "*STB"))
 
 
 def _fields(part: Part) -> list[str]:
     """Return the values of a reply, texts with their quotes."""
-    text, fields, within = part_as_text(part), [""], False
+    text, fields, in_quotes = part_as_text(part), [""], False
     for character in text:
-        within ^= character == '"'
-        if character == "," and not within:
+        in_quotes ^= character == '"'
+        if character == "," and not in_quotes:
             fields.append("")
         else:
             fields[-1] += character

@@ -1,10 +1,10 @@
 """Operator scripts (`.a7s`): a session written by hand, one statement per line.
 
-scenario akwanga seed 7                  # first of all: the instrument and what lies in the drawer
+scenario akwanga seed 7                  # first statement: the instrument and the photographs
 PHOT1:LOAD "101"                         # any line of the command language
 wait 30                                  # simulated s
-expect EYEP1? "1011" = 0, 0 +- 5         # a query, what it answers, and within what; texts exactly
-include mounting.a7s                     # another script, beside this one
+expect EYEP1? "1011" = 0, 0 +- 5         # a query, its reply, and a tolerance; texts exactly
+include mounting.a7s                     # another script, in the same folder
 """
 
 import math
@@ -23,7 +23,7 @@ SUFFIX = ".a7s"
 ANYTHING = "*"
 """Matches any value."""
 
-_OF_BINARY_FRACTIONS = 1e-9
+_BINARY_FRACTION_TOLERANCE = 1e-9
 
 _SCENARIO = re.compile(r"scenario\s+(\S+)(?:\s+seed\s+(\d{1,40}))?")
 _EXPECTED = re.compile(r"expect\s+(?P<query>.+?)\s+=\s+(?P<values>.+?)(?:\s+\+-\s+(?P<within>\S+))?")
@@ -74,15 +74,15 @@ class Expect:
 
     def matches(self, answer: tuple[str, ...]) -> bool:
         """Return whether a reply meets the expectation."""
-        return len(answer) == len(self.values) and all(map(self._met, self.values, answer))
+        return len(answer) == len(self.values) and all(map(self._matches_value, self.values, answer))
 
-    def _met(self, expected: str, got: str) -> bool:
+    def _matches_value(self, expected: str, got: str) -> bool:
         if expected == ANYTHING:
             return True
-        wanted, shown = _number(expected), _number(got)
-        if wanted is None or shown is None:
+        expected_value, actual_value = _number(expected), _number(got)
+        if expected_value is None or actual_value is None:
             return expected.strip('"') == got.strip('"')
-        return abs(wanted - shown) <= self.within + _OF_BINARY_FRACTIONS
+        return abs(expected_value - actual_value) <= self.within + _BINARY_FRACTION_TOLERANCE
 
 
 Statement = SendLine | Wait | Expect
@@ -103,12 +103,12 @@ def find_script(name: str) -> Path:
     path = Path(name)
     if path.is_file():
         return path
-    shelves = [shelf / "scripts" for shelf in SEARCH_PATH]
-    for shelf in shelves:
-        found = shelf / f"{path.name.removesuffix(SUFFIX)}{SUFFIX}"
+    folders = [folder / "scripts" for folder in SEARCH_PATH]
+    for folder in folders:
+        found = folder / f"{path.name.removesuffix(SUFFIX)}{SUFFIX}"
         if path.parent == Path() and found.is_file():
             return found
-    known = sorted({file.stem for shelf in shelves for file in shelf.glob(f"*{SUFFIX}")})
+    known = sorted({file.stem for folder in folders for file in folder.glob(f"*{SUFFIX}")})
     raise A7SimError(
         f"{name}: expected the folder of a session, its journal, or a script such as {', '.join(known)}; "
         "found no such file"
@@ -117,24 +117,24 @@ def find_script(name: str) -> Path:
 
 def read_script(path: Path) -> Script:
     """Return a script. Raises A7SimError with file and line."""
-    asked: list[tuple[SourceLocation, str, int | None]] = []
-    statements = tuple(_statements(path, (), asked))
-    if not asked:
+    scenarios: list[tuple[SourceLocation, str, int | None]] = []
+    statements = tuple(_statements(path, (), scenarios))
+    if not scenarios:
         raise A7SimError(f"{path}, line 1: expected a first line such as 'scenario akwanga seed 7', got none")
-    place, name, seed = asked[0]
-    for other, *rest in asked[1:]:
+    place, name, seed = scenarios[0]
+    for other, *rest in scenarios[1:]:
         if rest != [name, seed]:
             raise A7SimError(f"{other}: expected the scenario and seed of {place}, got others")
     try:
-        beside = place.file.parent / name
-        scenario = load_scenario(beside if beside.is_file() else name)
+        scenario_path = place.file.parent / name
+        scenario = load_scenario(scenario_path if scenario_path.is_file() else name)
     except ScenarioError as error:
         raise A7SimError(f"{place}: {error}") from error
     return Script(path, scenario, scenario.seed if seed is None else seed, statements)
 
 
 def _statements(
-    path: Path, within: tuple[Path, ...], asked: list[tuple[SourceLocation, str, int | None]]
+    path: Path, within: tuple[Path, ...], scenarios: list[tuple[SourceLocation, str, int | None]]
 ) -> Iterator[Statement]:
     for number, line in enumerate(read_text(path).splitlines(), start=1):
         text = _without_comment(line).strip()
@@ -142,11 +142,11 @@ def _statements(
         keyword = _KEYWORD.match(text)
         rest = text[keyword.end() :].strip() if keyword else ""
         if keyword and keyword[1] == "scenario":
-            asked.append((place, *_scenario(place, text)))
-        elif text and not asked:
+            scenarios.append((place, *_scenario(place, text)))
+        elif text and not scenarios:
             raise A7SimError(f"{place}: expected a first line such as 'scenario akwanga seed 7', got {text!r}")
         elif keyword and keyword[1] == "include":
-            yield from _included(place, rest, (*within, path.resolve()), asked)
+            yield from _include(place, rest, (*within, path.resolve()), scenarios)
         elif keyword and keyword[1] == "wait":
             yield Wait(place, _seconds(place, rest))
         elif keyword:
@@ -155,15 +155,15 @@ def _statements(
             yield SendLine(place, text)
 
 
-def _included(
-    place: SourceLocation, name: str, within: tuple[Path, ...], asked: list[tuple[SourceLocation, str, int | None]]
+def _include(
+    place: SourceLocation, name: str, within: tuple[Path, ...], scenarios: list[tuple[SourceLocation, str, int | None]]
 ) -> Iterator[Statement]:
     path = place.file.parent / name
     if not name or not path.is_file():
         raise A7SimError(f"{place}: expected a script beside this one to include, got {name or 'no name'}")
     if path.resolve() in within:
         raise A7SimError(f"{place}: expected a script that does not include itself, got {name}")
-    yield from _statements(path, within, asked)
+    yield from _statements(path, within, scenarios)
 
 
 def _scenario(place: SourceLocation, text: str) -> tuple[str, int | None]:
@@ -194,12 +194,12 @@ def _expect(place: SourceLocation, text: str) -> Expect:
 
 
 def _without_comment(line: str) -> str:
-    kept = ""
+    code = ""
     for part in _PARTS.finditer(line):
-        if part.start() != len(kept):
+        if part.start() != len(code):
             break
-        kept += part[0]
-    return kept
+        code += part[0]
+    return code
 
 
 def _number(text: str) -> float | None:

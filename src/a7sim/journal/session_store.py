@@ -37,7 +37,7 @@ class SavedSession:
             return False
         journals = self.begun.journalled
         events = (journals.event(number) for number in range(len(journals), 1, -1))
-        return any(event.dir == ">" and _does(event.text) for event in events)
+        return any(event.dir == ">" and _is_change(event.text) for event in events)
 
     @property
     def last_activity(self) -> float:
@@ -45,22 +45,24 @@ class SavedSession:
         return (self.folder / JOURNAL).stat().st_mtime
 
 
-def _does(line: str) -> bool:
+def _is_change(line: str) -> bool:
     return any(unit and "?" not in unit for unit in line.split(";"))
 
 
 def last_session(folder: Path, scenario: Scenario, seed: int) -> SavedSession | None:
     """Return the last session of a scenario and a seed in a folder of this name, numbered or not, if any."""
-    wanted = hash_scenario(scenario), seed
-    return next((left for each in _latest_first(folder) if (left := _left_in(each, *wanted)) is not None), None)
+    identity = hash_scenario(scenario), seed
+    return next(
+        (saved for each in _folders_by_time(folder) if (saved := _saved_session(each, *identity)) is not None), None
+    )
 
 
-def _latest_first(folder: Path) -> list[Path]:
-    journals = [each for each in _numbered(folder).values() if (each / JOURNAL).is_file()]
+def _folders_by_time(folder: Path) -> list[Path]:
+    journals = [each for each in _numbered_folders(folder).values() if (each / JOURNAL).is_file()]
     return sorted(journals, key=lambda each: (each / JOURNAL).stat().st_mtime, reverse=True)
 
 
-def _left_in(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None:
+def _saved_session(folder: Path, scenario_hash: str, seed: int) -> SavedSession | None:
     try:
         header = read_journal(folder / JOURNAL).header
     except A7SimError as error:
@@ -79,7 +81,7 @@ def new_folder(folder: Path) -> Path:
     """Create a folder of this name, numbered if there are others, and return it. Raises A7SimError if that fails."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        for each in _free(folder):
+        for each in _free_names(folder):
             try:
                 each.mkdir()
             except FileExistsError:
@@ -90,7 +92,7 @@ def new_folder(folder: Path) -> Path:
     raise AssertionError("there is always another number")
 
 
-def _numbered(folder: Path) -> dict[int, Path]:
+def _numbered_folders(folder: Path) -> dict[int, Path]:
     """Return the folders of this name by number; number 1 has no suffix."""
     if not folder.parent.is_dir():
         return {}
@@ -100,8 +102,8 @@ def _numbered(folder: Path) -> dict[int, Path]:
     return {int(match[1] or 1): each for match, each in found if match}
 
 
-def _free(folder: Path) -> Iterator[Path]:
-    number = max(_numbered(folder), default=0)
+def _free_names(folder: Path) -> Iterator[Path]:
+    number = max(_numbered_folders(folder), default=0)
     while True:
         number += 1
         yield folder if number == 1 else folder.with_name(f"{folder.name}-{number}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from a7sim.instrument.language import LinkEvent, Listener
 from a7sim.journal.format import Event
 
-_IN_WORDS = {"+": "+ connects", "-": "- disconnects", "~": "~ continues"}
+_DIRECTION_TEXTS = {"+": "+ connects", "-": "- disconnects", "~": "~ continues"}
 
 
 def format_event(event: Event) -> str:
@@ -18,23 +18,23 @@ def format_event(event: Event) -> str:
         return _line(event.t, "book", f"{event.number} struck out: {event.struck}")
     if event.kind:
         return _line(event.t, event.kind, event.hash)
-    return _line(event.t, event.client, f"{_IN_WORDS.get(event.dir, event.dir)} {event.text}")
+    return _line(event.t, event.client, f"{_DIRECTION_TEXTS.get(event.dir, event.dir)} {event.text}")
 
 
-def _line(time: float, active: str, what: str) -> str:
-    return f"{time:10.2f} {active:<9} {what}".rstrip()
+def _line(time: float, source: str, text: str) -> str:
+    return f"{time:10.2f} {source:<9} {text}".rstrip()
 
 
 @dataclass(frozen=True)
 class TranscriptListener:
     """Listener that prints each event when it is due, after another listener has handled it."""
 
-    tell: Callable[[str], None]
-    until: Callable[[float], None]
-    first: Listener
+    on_line: Callable[[str], None]
+    wait_until: Callable[[float], None]
+    listener: Listener
 
     def on_link_event(self, event: LinkEvent) -> None:
         """Print an event on the link."""
-        self.first(event)
-        self.until(event.time)
-        self.tell(format_event(Event(event.time, event.client, event.direction, event.text)))
+        self.listener(event)
+        self.wait_until(event.time)
+        self.on_line(format_event(Event(event.time, event.client, event.direction, event.text)))

@@ -20,14 +20,14 @@ from a7sim.operator.people.observation_book import BookEntry
 from a7sim.scenario import Scenario, hash_scenario, to_data
 from a7sim.scene import PICTURES
 
-_REGISTERS = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
+_REGISTRATION = re.compile(r"(^|[\s;:])REC(ORD)?(:STR(IKE)?)?\s", re.IGNORECASE)
 
 _MAX_SHOWN_LENGTH = 300
 
 
 def is_registration(line: str) -> bool:
     """Return whether a line registers a reading or strikes it out."""
-    return _REGISTERS.search(line) is not None
+    return _REGISTRATION.search(line) is not None
 
 
 def software_version() -> str:
@@ -67,7 +67,7 @@ def make_header_without_scenario(command: str, **settings: Any) -> Header:
 
 @dataclass(frozen=True)
 class JournalOptions:
-    """Options of a journal: its durability, and whether it continues a kept one."""
+    """Options of a journal: its durability, and whether it continues an existing one."""
 
     durability: Durability = "records"
     resumes: bool = False
@@ -81,14 +81,14 @@ class JournalOptions:
 
     def for_part(self, folder: Path | None) -> "JournalOptions":
         """Return the options for a part of a session, which may have been interrupted before this part started."""
-        begun = folder is not None and has_header(folder / JOURNAL)
-        return replace(self, resumes=self.resumes and begun)
+        is_started = folder is not None and has_header(folder / JOURNAL)
+        return replace(self, resumes=self.resumes and is_started)
 
 
 class Journal:
     """Journal, a listener from its creation and a writer from its opening as a context.
 
-    A resumed session runs again from its start: up to the end of the kept journal, its events are compared with it;
+    A resumed session runs again from its start: up to the end of the existing journal, its events are compared with it;
     then writing continues.
     """
 
@@ -116,10 +116,10 @@ class Journal:
             if self._journal_options.resumes:
                 self._existing = read_journal(folder / JOURNAL)
                 save_truncated_tail(self._existing)
-            self._begin(folder, self._existing.size if self._existing else 0, b"")
+            self._open_files(folder, self._existing.size if self._existing else 0, b"")
             try:
                 if self._existing is None:
-                    _leave_scenario(folder, header)
+                    _write_scenario(folder, header)
                 self._write(header.line)
                 for event in self._unwritten:
                     self.on_link_event(event)
@@ -129,18 +129,20 @@ class Journal:
         self._unwritten.clear()
         return self
 
-    def resume_at(self, kept: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]) -> "Journal":
+    def resume_at(
+        self, existing: JournalFile, instrument: SharedInstrument, checkpoints: list[Checkpoint]
+    ) -> "Journal":
         """Continue a journal whose session is restored in an instrument. Raises A7SimError if it cannot be written."""
-        save_truncated_tail(kept)
+        save_truncated_tail(existing)
         self._instrument = instrument
-        self._begin(kept.path.parent, kept.size, to_lines(checkpoints))
-        self._chain.crc, self._line = kept.crc, len(kept)
+        self._open_files(existing.path.parent, existing.size, to_lines(checkpoints))
+        self._chain.crc, self._line = existing.crc, len(existing)
         last = checkpoints[-1].line if checkpoints else 1
-        self._since_checkpoint = sum(not kept.event(number).kind for number in range(last + 1, len(kept) + 1))
+        self._since_checkpoint = sum(not existing.event(number).kind for number in range(last + 1, len(existing) + 1))
         self._changes = sum(len(each.state["autograph"]["registered"]) for each in checkpoints)
         return self
 
-    def _begin(self, folder: Path, size: int, states: bytes) -> None:
+    def _open_files(self, folder: Path, size: int, states: bytes) -> None:
         self._file = AppendOnlyFile(folder / JOURNAL, self._journal_options.durability, size)
         if self._journal_options.states:
             self._states = folder / STATES
@@ -149,12 +151,12 @@ class Journal:
     def on_link_event(self, event: LinkEvent) -> None:
         """Write an event on the link. Raises JournalWriteError if that fails, except for a disconnect."""
         try:
-            self._hear(event)
+            self._write_event(event)
         except JournalWriteError:
             if event.direction != "-":
                 raise
 
-    def _hear(self, event: LinkEvent) -> None:
+    def _write_event(self, event: LinkEvent) -> None:
         if event.direction in "<>":
             self.lines_over_the_link += 1
         if self._file is None:
@@ -202,8 +204,8 @@ class Journal:
             if error is None and self._instrument is not None and self._instrument.is_idle and self._since_checkpoint:
                 self._checkpoint(self._time, self._instrument)
             if error is None and self._existing is not None and self._line < len(self._existing):
-                over = self._existing.location(self._line + 1)
-                raise A7SimError(f"{over}: expected the end of the session, got a line that is left over")
+                location = self._existing.location(self._line + 1)
+                raise A7SimError(f"{location}: expected the end of the session, got a line that is left over")
         finally:
             self._close()
 
@@ -216,12 +218,12 @@ class Journal:
         state = instrument.state(self._changes)
         self._changes = len(instrument.autograph.recorder.changes)
         self._since_checkpoint = 0
-        found = state_hash(state)
-        self._write(Event(time, kind="state", hash=found))
+        hash_of_state = state_hash(state)
+        self._write(Event(time, kind="state", hash=hash_of_state))
         if self._states is not None:
             try:
                 with self._states.open("ab") as states:
-                    states.write(to_lines([Checkpoint(self._line, time, found, state)]))
+                    states.write(to_lines([Checkpoint(self._line, time, hash_of_state, state)]))
             except OSError as error:
                 raise write_failure_message(self._states, error) from error
 
@@ -232,7 +234,7 @@ class Journal:
         self._line += 1
         if self._existing is not None and self._line <= len(self._existing):
             if line != self._existing.lines[self._line - 1]:
-                raise A7SimError(_not_the_same(self._existing, self._line, line))
+                raise A7SimError(_difference_message(self._existing, self._line, line))
         else:
             self._file.add(line + b"\n", at_once)
 
@@ -249,12 +251,12 @@ class Journal:
 def write_header_only(folder: Path, header: Header) -> None:
     """Write a journal with only a header, for a folder of folders. Raises A7SimError."""
     file = AppendOnlyFile(folder / JOURNAL)
-    _leave_scenario(folder, header)
+    _write_scenario(folder, header)
     file.add(ChecksumChain().line(header.line) + b"\n")
     file.close()
 
 
-def _leave_scenario(folder: Path, header: Header) -> None:
+def _write_scenario(folder: Path, header: Header) -> None:
     if header.scenario is not None:
         data = msgspec.json.format(msgspec.json.encode(to_data(header.scenario))) + b"\n"
         file = AppendOnlyFile((folder / JOURNAL).with_suffix(SCENARIO_SUFFIX), "always")
@@ -264,19 +266,22 @@ def _leave_scenario(folder: Path, header: Header) -> None:
             file.close()
 
 
-def save_truncated_tail(kept: JournalFile) -> None:
+def save_truncated_tail(existing: JournalFile) -> None:
     """Write the truncated tail of a journal beside it. Raises A7SimError if that fails."""
-    if kept.truncated_tail:
+    if existing.truncated_tail:
         try:
-            (kept.path.parent / TORN).write_bytes(kept.truncated_tail)
+            (existing.path.parent / TORN).write_bytes(existing.truncated_tail)
         except OSError as error:
-            raise A7SimError(f"{kept.path}: expected a journal that can be written: {error.strerror}") from error
+            raise A7SimError(f"{existing.path}: expected a journal that can be written: {error.strerror}") from error
 
 
-def _not_the_same(kept: JournalFile, number: int, line: bytes) -> str:
-    was, is_now = (each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (kept.lines[number - 1], line))
+def _difference_message(existing: JournalFile, number: int, line: bytes) -> str:
+    existing_line, new_line = (
+        each[:_MAX_SHOWN_LENGTH].decode("utf-8", "replace") for each in (existing.lines[number - 1], line)
+    )
     if number == 1:
         return (
-            f"{kept.location(number)}: expected a session of {software_version()} and its scenario, got another: {was}"
+            f"{existing.location(number)}: expected a session of {software_version()} and its scenario, "
+            f"got another: {existing_line}"
         )
-    return f"{kept.location(number)}: expected what this session does again, {is_now}, got another's, {was}"
+    return f"{existing.location(number)}: expected this session's event, {new_line}, got another, {existing_line}"

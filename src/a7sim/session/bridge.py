@@ -55,16 +55,16 @@ def run_bridge(scenario: Scenario, seed: int, options: RunOptions | None = None)
     with recorded.recording(
         make_header("bridge", scenario, seed),
         lambda end: document | end_document(end),
-        lambda: {MODELS: models_csv([_as_model(name, each) for name, each in places.items()])},
+        lambda: {MODELS: models_csv([_make_model(name, each) for name, each in places.items()])},
     ):
         for model in bridge_strip(session.person, job, options.callbacks.on_point, options.callbacks.on_activity):
             places[model.model.name] = model.coordinates_of(0)
-            model_documents.append(_of_model(model))
+            model_documents.append(_model_document(model))
     document |= end_document(recorded.end)
     if document["status"] != "complete":
         return document
     document["bridged"] |= {
-        "strip": _on_ground(strip_points([*places.values()]), ground_control(scenario, session.scene), scenario),
+        "strip": _ground_document(strip_points([*places.values()]), ground_control(scenario, session.scene), scenario),
         "hours": round(session.person.clock.now / 3600.0, 3),
     }
     document |= {"status": "interrupted", "message": "the session was interrupted among the independent models"}
@@ -88,11 +88,11 @@ def bridge_over_link(scenario: Scenario, seed: int) -> BridgeResult:
     message = ""
     try:
         for each in bridge_strip(session.person, session.job):
-            models.append(_as_model(each.model.name, each.coordinates_of(0)))
+            models.append(_make_model(each.model.name, each.coordinates_of(0)))
     except (OperatorGaveUp, Undetermined) as error:
         message = str(error)
     operator = hours_document(session.person.clock.now, session.person.timesheet)
-    return _bridging(models, message, operator, scenario, session.scene)
+    return _bridge_result(models, message, operator, scenario, session.scene)
 
 
 def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[BridgeResult]:
@@ -101,10 +101,10 @@ def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[BridgeResult]
     models: list[list[Model]] = [[] for _ in seeds]
     for each in bridge_strip_batch(batch.workstation):
         for session in each.sessions.tolist():
-            models[session].append(_as_model(each.model.name, each.coordinates_of(session)))
+            models[session].append(_make_model(each.model.name, each.coordinates_of(session)))
     operators = batch.workstation.operators
     return [
-        _bridging(
+        _bridge_result(
             models[session],
             operators.reasons.get(session, ""),
             hours_document(float(operators.seconds[session]), operators.timesheet, session),
@@ -115,7 +115,7 @@ def bridge_batch(scenario: Scenario, seeds: Sequence[int]) -> list[BridgeResult]
     ]
 
 
-def _bridging(
+def _bridge_result(
     models: Sequence[Model], message: str, operator: Document, scenario: Scenario, scene: Scene
 ) -> BridgeResult:
     if message:
@@ -132,7 +132,7 @@ def _bridging(
     )
 
 
-def _as_model(name: str, places: Places) -> Model:
+def _make_model(name: str, places: Places) -> Model:
     return Model(name, tuple(places), np.array([*places.values()]).T)
 
 
@@ -143,14 +143,14 @@ def average_points(models: Iterable[Model]) -> Model:
 
 def strip_points(places: Iterable[Places]) -> Model:
     """Return all points of a bridged strip in mm, averaged over models."""
-    found: dict[str, list[tuple[float, float, float]]] = {}
+    by_point: dict[str, list[tuple[float, float, float]]] = {}
     for model in places:
         for name, place in model.items():
-            found.setdefault(name, []).append(place)
-    return Model("bridge", tuple(found), np.array([np.mean(each, axis=0) for each in found.values()]).T)
+            by_point.setdefault(name, []).append(place)
+    return Model("bridge", tuple(by_point), np.array([np.mean(each, axis=0) for each in by_point.values()]).T)
 
 
-def _on_ground(strip: Model, ground: Ground, scenario: Scenario) -> Document:
+def _ground_document(strip: Model, ground: Ground, scenario: Scenario) -> Document:
     try:
         oriented = absolute_orientation(strip, ground)
         document = absolute_document(oriented)
@@ -163,7 +163,7 @@ def _on_ground(strip: Model, ground: Ground, scenario: Scenario) -> Document:
     return document
 
 
-def _of_model(bridged: BridgedModels) -> Document:
+def _model_document(bridged: BridgedModels) -> Document:
     orientation = bridged.orientation.of(0)
     mm = [1.0, 1.0, 1.0 / bridged.z_units_per_mm]
     common = {name: [round(float(v), 4) for v in each[:, 0] * mm] for name, each in bridged.common.items()}
@@ -181,20 +181,20 @@ def _of_model(bridged: BridgedModels) -> Document:
 
 def bridge_tables(document: Document) -> RenderableType:
     """Return the tables of a bridged strip and of the independent models, for a terminal."""
-    messages = f"{document['status']}: {document['message']}" if document["message"] else ""
-    parts: list[RenderableType] = [_models(document["bridged"]["models"])]
+    summary = f"{document['status']}: {document['message']}" if document["message"] else ""
+    parts: list[RenderableType] = [_model_table(document["bridged"]["models"])]
     if "independent" in document:
-        parts += [Text(), _beside(document)]
+        parts += [Text(), _comparison_table(document)]
         parts.append(
             Text(
                 f"{document['bridged']['hours']:.1f} hours at the instrument bridging, "
                 f"{document['independent']['hours']:.1f} with independent models and their perspective centres"
             )
         )
-    return Group(*parts, *([Text(messages, style="bold")] if messages else []))
+    return Group(*parts, *([Text(summary, style="bold")] if summary else []))
 
 
-def _models(models: Sequence[Document]) -> RenderableType:
+def _model_table(models: Sequence[Document]) -> RenderableType:
     table = text_table("model", "base", "bx, mm", "scale", "rms p, mm", "common X", "Y", "Z, mm")
     for model in models:
         common = np.array(list(model["common_mm"].values())).reshape(-1, 3)
@@ -210,15 +210,15 @@ def _models(models: Sequence[Document]) -> RenderableType:
     return Group(Text("Bridged models: scale carried by bx, rms of differences at common points", style="bold"), table)
 
 
-def _beside(document: Document) -> RenderableType:
+def _comparison_table(document: Document) -> RenderableType:
     table = text_table("strip", "points", "X", "Y", "Z", "plan", "height", fold=(1,))
-    for way in ("bridged", "independent"):
-        strip = document[way]["strip"]
-        for label, part in ((way, strip), (f"{way}, polynomial", strip.get("polynomial", {}))):
-            for on, each in part.get("accuracy_m", {}).items():
+    for method in ("bridged", "independent"):
+        strip = document[method]["strip"]
+        for label, part in ((method, strip), (f"{method}, polynomial", strip.get("polynomial", {}))):
+            for group, each in part.get("accuracy_m", {}).items():
                 values = [*each["rms"].values(), each["plan"], each["height"]]
                 cells = ["" if value is None else f"{value:.3f}" for value in values]
-                table.add_row(label, f"{each['points']} {on}", *cells)
+                table.add_row(label, f"{each['points']} {group}", *cells)
         if "message" in strip:
-            table.add_row(way, strip["message"])
+            table.add_row(method, strip["message"])
     return Group(Text("On the ground, rms in m", style="bold"), table)

@@ -40,52 +40,52 @@ def combine_strips(
     strip.
     """
     for first in range(0, len(replicates), CHUNK_SIZE):
-        some = replicates[first : first + CHUNK_SIZE]
-        strips = _on_arrays(some, models, ground, plan)
-        for i, each in enumerate(some):
+        chunk = replicates[first : first + CHUNK_SIZE]
+        strips = _batch_strips(chunk, models, ground, plan)
+        for i, each in enumerate(chunk):
             documents = {case: _model_documents(session, brief) for case, session in each.items()}
             yield [
-                _document(each, documents, cases, strips.get((i, cases)) or _by_itself(each, cases, ground, plan))
+                _document(each, documents, cases, strips.get((i, cases)) or _single_strip(each, cases, ground, plan))
                 for cases in cases_of_strips(tuple(each), models)
             ]
 
 
-def _on_arrays(
-    some: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
+def _batch_strips(
+    chunk: Sequence[Replicate], models: int, ground: Ground, plan: StripPlan
 ) -> dict[tuple[int, Cases], Document]:
     """Return the strips of replicates whose sessions all have the same points and full control."""
     groups: dict[tuple[Cases, ...], list[tuple[int, dict[str, list[Model]]]]] = defaultdict(list)
-    for i, replicate in enumerate(some):
+    for i, replicate in enumerate(chunk):
         if plan.polynomial is None and all(each.status == "complete" for each in replicate.values()):
             by_case = {case: each.strip_models for case, each in replicate.items()}
-            alike = {tuple(model.points for model in each) for each in by_case.values()}
-            if len(alike) == 1:
-                groups[alike.pop()].append((i, by_case))
-    return {key: strip for group in groups.values() for key, strip in _of_group(group, models, ground, plan)}
+            point_lists = {tuple(model.points for model in each) for each in by_case.values()}
+            if len(point_lists) == 1:
+                groups[point_lists.pop()].append((i, by_case))
+    return {key: strip for group in groups.values() for key, strip in _group_strips(group, models, ground, plan)}
 
 
-def _of_group(
+def _group_strips(
     group: Sequence[tuple[int, Mapping[str, Sequence[Model]]]], models: int, ground: Ground, plan: StripPlan
 ) -> Iterator[tuple[tuple[int, Cases], Document]]:
     first = group[0][1]
-    of_strips = cases_of_strips(tuple(first), models)
+    combinations = cases_of_strips(tuple(first), models)
     stacked = []
-    for place, model in enumerate(next(iter(first.values()))):
-        by_case = {case: np.stack([each[case][place].coordinates for _, each in group], axis=-1) for case in first}
-        each_strip = np.stack([by_case[cases[place]] for cases in of_strips], axis=-1)
+    for index, model in enumerate(next(iter(first.values()))):
+        by_case = {case: np.stack([each[case][index].coordinates for _, each in group], axis=-1) for case in first}
+        each_strip = np.stack([by_case[cases[index]] for cases in combinations], axis=-1)
         stacked.append(Model(model.name, model.points, each_strip.reshape((*each_strip.shape[:2], -1))))
-    if not _full_control(stacked, ground):
+    if not _has_full_control(stacked, ground):
         return
     try:
         strip = formed_strip(stacked, plan.join)
         fit = fitted_to_ground(strip.as_model, ground)[1]
     except Undetermined as undetermined:
         raise A7SimError(f"strips of all cases: {undetermined}") from undetermined
-    keys = [(i, cases) for i, _ in group for cases in of_strips]
+    keys = [(i, cases) for i, _ in group for cases in combinations]
     yield from zip(keys, _documents(strip, fit), strict=True)
 
 
-def _full_control(models: Sequence[Model], ground: Ground) -> bool:
+def _has_full_control(models: Sequence[Model], ground: Ground) -> bool:
     """Return whether a strip is fitted to its control in closed form, member by member."""
     names = {name for model in models for name in model.points}
     return all(role in ("control", "check") for role in ground.among(tuple(names)).roles)
@@ -95,19 +95,23 @@ def _documents(strip: Strip, fit: GroundFit) -> Iterator[Document]:
     """Yield one document per member of a batch with joins and accuracy of the strip, without single points."""
     joins = [(join.before, join.after, join.scale.tolist(), join.max_residual.tolist()) for join in strip.joins]
     on = {
-        which: _accuracy(residuals)
-        for which, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
+        role_group: _accuracy(residuals)
+        for role_group, residuals in (("control", fit.at_control), ("checks", fit.at_checks))
         if np.isfinite(residuals).any()
     }
     for member in range(fit.computed.shape[-1]):
         yield {
             "joins": [
-                {"models": [before, after], "scale": scale[member], "max_residual_mm": worst[member]}
-                for before, after, scale, worst in joins
+                {"models": [before, after], "scale": scale[member], "max_residual_mm": max_residual[member]}
+                for before, after, scale, max_residual in joins
             ],
             "accuracy_m": {
-                which: {"rms": {"X": x[member], "Y": y[member], "Z": z[member]}, "plan": p[member], "height": z[member]}
-                for which, (x, y, z, p) in on.items()
+                role_group: {
+                    "rms": {"X": x[member], "Y": y[member], "Z": z[member]},
+                    "plan": p[member],
+                    "height": z[member],
+                }
+                for role_group, (x, y, z, p) in on.items()
             },
         }
 
@@ -118,10 +122,10 @@ def _accuracy(residuals: Array) -> tuple[list[float], ...]:
     return tuple(each.tolist() for each in (x, y, z, np.hypot(x, y)))
 
 
-def _by_itself(replicate: Replicate, cases: Cases, ground: Ground, plan: StripPlan) -> Document:
+def _single_strip(replicate: Replicate, cases: Cases, ground: Ground, plan: StripPlan) -> Document:
     if any(replicate[case].status != "complete" for case in cases):
         return {}
-    models = [replicate[case].strip_models[place] for place, case in enumerate(cases)]
+    models = [replicate[case].strip_models[index] for index, case in enumerate(cases)]
     try:
         return oriented_strip_document(orient_strip(models, ground, plan.join, plan.polynomial))
     except Undetermined as undetermined:
@@ -138,8 +142,8 @@ def _document(
     gave_up = next((replicate[case] for case in cases if replicate[case].status != "complete"), None)
     if gave_up is not None:
         return {"status": gave_up.status, "message": gave_up.message}
-    models = [documents[case][place] for place, case in enumerate(cases)]
-    seconds = sum(_seconds(documents[case], place) for place, case in enumerate(cases))
+    models = [documents[case][index] for index, case in enumerate(cases)]
+    seconds = sum(_seconds(documents[case], index) for index, case in enumerate(cases))
     return {
         "status": "complete",
         "message": "",
@@ -149,7 +153,7 @@ def _document(
     }
 
 
-def _seconds(models: Sequence[Document], place: int) -> float:
+def _seconds(models: Sequence[Document], index: int) -> float:
     """Return the duration of a model in its session, s."""
-    before = models[place - 1]["finished_at_s"] if place else 0.0
-    return float(models[place]["finished_at_s"] - before)
+    before = models[index - 1]["finished_at_s"] if index else 0.0
+    return float(models[index]["finished_at_s"] - before)

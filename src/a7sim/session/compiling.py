@@ -27,9 +27,9 @@ from a7sim.strip_methods.strip import given_control
 OLD_MAP_M = 5.0
 """Rounding in m of the line data that an operator gets from an old map."""
 
-_FURTHER_ON_M = 40.0
+_DIRECTION_DISTANCE_M = 40.0
 
-WITHIN_HALF = 3.29
+HALF_INTERVAL_FACTOR = 3.29
 """A contour interval fits a standard error if 90 % of the heights are within half of it: 2 x 1.645 standard errors."""
 
 USUAL_C_FACTORS = (900.0, 2200.0)
@@ -56,7 +56,7 @@ class CompilationRequest:
 def compile_model(
     scenario: Scenario,
     seed: int,
-    wanted: CompilationRequest,
+    request: CompilationRequest,
     options: RunOptions | None = None,
 ) -> Document:
     """Compile a model with the virtual operator and return the document of results; with `out`, write map and files.
@@ -65,30 +65,30 @@ def compile_model(
     request.
     """
     options = options or RunOptions()
-    _see_that_it_can_be(scenario, wanted)
+    _check_request(scenario, request)
     recorded = recorded_session(scenario, seed, options)
     session = recorded.session
-    order = _order(wanted, scenario, session.scene)
+    map_request = _map_request(request, scenario, session.scene)
     options.prepare_folder()
     document = document_header("compile") | {
         **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",
         "scenario": scenario.title,
         "seed": seed,
-        "model": wanted.model,
+        "model": request.model,
         "status": "failed",
         "message": "",
     }
     drawings: dict[str, str] = {}
-    header = make_header("compile", scenario, seed, **asdict(wanted))
+    header = make_header("compile", scenario, seed, **asdict(request))
     with recorded.recording(header, lambda end: document | end_document(end), lambda: drawings):
-        sheet = _sheet(session, wanted, order, options.callbacks)
-        document |= _of_sheet(sheet, session.scene, scenario)
-        drawings |= {GEOJSON: to_geojson(sheet), SVG: to_svg(sheet, scenario.title)}
+        compiled = _compile(session, request, map_request, options.callbacks)
+        document |= _map_document(compiled, session.scene, scenario)
+        drawings |= {GEOJSON: to_geojson(compiled), SVG: to_svg(compiled, scenario.title)}
     return document | end_document(recorded.end)
 
 
-def _see_that_it_can_be(scenario: Scenario, wanted: CompilationRequest) -> None:
+def _check_request(scenario: Scenario, request: CompilationRequest) -> None:
     if VARIANTS[scenario.instrument.variant].missing_elements(*BASE_COMPONENTS):
         raise A7SimError(
             "instrument.variant: expected a plotter with by and bz, whose cameras the stereo view knows, "
@@ -100,53 +100,59 @@ def _see_that_it_can_be(scenario: Scenario, wanted: CompilationRequest) -> None:
             f"plan.plan_gear: expected a gear to the plotting table ({known}), got {scenario.plan.plan_gear}"
         )
     models = {model.name: model for model in scenario.models}
-    if wanted.model not in models:
-        raise A7SimError(f"--model: expected one of {', '.join(models)}, got {wanted.model}")
+    if request.model not in models:
+        raise A7SimError(f"--model: expected one of {', '.join(models)}, got {request.model}")
     flown = {photo.name for photo in scenario.photos if photo.position is not None}
-    model = models[wanted.model]
+    model = models[request.model]
     if not {model.left, model.right} <= flown:
-        raise A7SimError(f"--model {wanted.model}: expected photographs that show the ground, got measured points only")
+        raise A7SimError(
+            f"--model {request.model}: expected photographs that show the ground, got measured points only"
+        )
     known_lines = [line.name for line in scenario.lines]
-    for name in wanted.lines:
+    for name in request.lines:
         if name not in known_lines:
             raise A7SimError(
                 f"--line: expected one of {', '.join(known_lines) or 'none, the scenario has no lines'}, got {name}"
             )
-    if not (wanted.contours or wanted.interval or wanted.lines):
+    if not (request.contours or request.interval or request.lines):
         raise A7SimError("compile: expected a --contour, an --interval or a --line to be drawn, got none")
 
 
-def _order(wanted: CompilationRequest, scenario: Scenario, scene: Scene) -> MapRequest:
-    errands = tuple(_errand(scene, name) for name in dict.fromkeys(wanted.lines))
-    tracing = Tracing.of(scenario.observer, wanted.tremor_um)
-    return MapRequest(wanted.contours, wanted.interval, errands, tracing, wanted.map_scale)
+def _map_request(request: CompilationRequest, scenario: Scenario, scene: Scene) -> MapRequest:
+    targets = tuple(_line_target(scene, name) for name in dict.fromkeys(request.lines))
+    tracing = Tracing.of(scenario.observer, request.tremor_um)
+    return MapRequest(request.contours, request.interval, targets, tracing, request.map_scale)
 
 
-def _errand(scene: Scene, name: str) -> LineTarget:
+def _line_target(scene: Scene, name: str) -> LineTarget:
     """Return the data of a line on an old map: its two ends and its initial direction, rounded to some metres."""
     line = scene.lines[name]
     along = np.concatenate([[0.0], np.cumsum(length_of(np.diff(line.middle, axis=1)))])
-    further = line.middle[:, int(np.searchsorted(along, min(_FURTHER_ON_M, along[-1])))]
+    direction_point = line.middle[:, int(np.searchsorted(along, min(_DIRECTION_DISTANCE_M, along[-1])))]
 
-    def on_the_map(place: Array) -> tuple[float, float]:
+    def map_position(place: Array) -> tuple[float, float]:
         east, north = OLD_MAP_M * np.round(place / OLD_MAP_M)
         return float(east), float(north)
 
     return LineTarget(
-        name, line.kind, on_the_map(line.middle[:, 0]), on_the_map(further), on_the_map(line.middle[:, -1])
+        name,
+        line.kind,
+        map_position(line.middle[:, 0]),
+        map_position(direction_point),
+        map_position(line.middle[:, -1]),
     )
 
 
-def _sheet(
-    session: Session, wanted: CompilationRequest, order: MapRequest, callbacks: ProgressCallbacks
+def _compile(
+    session: Session, request: CompilationRequest, map_request: MapRequest, callbacks: ProgressCallbacks
 ) -> CompiledMap:
-    models = tuple(model for model in session.job.models if model.name == wanted.model)
+    models = tuple(model for model in session.job.models if model.name == request.model)
     control = given_control(session.scenario, session.scene)
     return compile_map(
         session.person,
         replace(session.job, models=models, control={}),
         control,
-        order,
+        map_request,
         callbacks.on_point,
         callbacks.on_activity,
     )
@@ -155,52 +161,54 @@ def _sheet(
 # --- the document ------------------------------------------------------------------------------------------
 
 
-def _of_sheet(sheet: CompiledMap, scene: Scene, scenario: Scenario) -> Document:
-    lines = [_of_line(each, sheet, scene) for each in sheet.lines]
-    errors = np.concatenate([np.zeros(0), *(_height_errors(t, sheet, scene) for t in sheet.lines if t.kind == CONTOUR)])
-    at = sheet.model.on_ground(sheet.spots.readings)
+def _map_document(compiled: CompiledMap, scene: Scene, scenario: Scenario) -> Document:
+    lines = [_line_document(each, compiled, scene) for each in compiled.lines]
+    errors = np.concatenate(
+        [np.zeros(0), *(_height_errors(line, compiled, scene) for line in compiled.lines if line.kind == CONTOUR)]
+    )
+    at = compiled.model.on_ground(compiled.spots.readings)
     spot_errors = at[2] - scene.ground.height(at[0], at[1])
     return {
-        "map_scale": sheet.map_scale,
-        "model_scale": sheet.model.scale_number,
+        "map_scale": compiled.map_scale,
+        "model_scale": compiled.model.scale_number,
         "plan_gear": scenario.plan.plan_gear,
         "levelling": {
-            "rounds": sheet.model.rounds,
-            "tilt_left_gon": round(sheet.model.tilt_gon, 5),
-            "scale_found": round(1e3 * sheet.model.metres_per_mm, 2),
+            "rounds": compiled.model.rounds,
+            "tilt_left_gon": round(compiled.model.tilt_gon, 5),
+            "scale_found": round(1e3 * compiled.model.metres_per_mm, 2),
         }
-        | absolute_document(sheet.model.absolute),
-        "expected": {"sigma_height_m": round(sheet.sigma_height, 4), "sigma_plan_m": round(sheet.sigma_plan, 4)},
-        "spot_heights": int(np.isfinite(sheet.spots.heights).sum()),
-        "range_m": [round(each, 2) for each in sheet.spots.range],
+        | absolute_document(compiled.model.absolute),
+        "expected": {"sigma_height_m": round(compiled.sigma_height, 4), "sigma_plan_m": round(compiled.sigma_plan, 4)},
+        "spot_heights": int(np.isfinite(compiled.spots.heights).sum()),
+        "range_m": [round(each, 2) for each in compiled.spots.range],
         "lines": lines,
         "beside_the_truth": {
             "spot_heights_rms_m": _rms(spot_errors[np.isfinite(spot_errors)]),
-            "contours": _accuracy(errors, sheet) if errors.size else None,
+            "contours": _accuracy(errors, compiled) if errors.size else None,
         },
     }
 
 
-def _accuracy(errors: Array, sheet: CompiledMap) -> Document:
+def _accuracy(errors: Array, compiled: CompiledMap) -> Document:
     """Return rms height error of contours, the interval that it allows, and the flying height divided by that
     (C-factor).
     """
     rms = float(np.sqrt((errors**2).mean()))
-    interval = WITHIN_HALF * rms
+    interval = HALF_INTERVAL_FACTOR * rms
     return {
         "rms_height_m": round(rms, 4),
         "mean_m": round(float(errors.mean()), 4),
         "largest_m": round(float(np.abs(errors).max()), 4),
-        "per_mille_of_flying_height": round(1e3 * rms / sheet.height_above_ground, 4),
-        "flying_height_m": round(sheet.height_above_ground, 1),
+        "per_mille_of_flying_height": round(1e3 * rms / compiled.height_above_ground, 4),
+        "flying_height_m": round(compiled.height_above_ground, 1),
         "smallest_interval_m": round(interval, 3),
-        "c_factor": round(sheet.height_above_ground / interval) if interval > 0.0 else None,
+        "c_factor": round(compiled.height_above_ground / interval) if interval > 0.0 else None,
     }
 
 
-def _of_line(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Document:
-    at = sheet.model.on_ground(traced.readings)
-    errors = _height_errors(traced, sheet, scene)
+def _line_document(traced: TracedLine, compiled: CompiledMap, scene: Scene) -> Document:
+    at = compiled.model.on_ground(traced.readings)
+    errors = _height_errors(traced, compiled, scene)
     document: Document = {
         "name": traced.name,
         "kind": traced.kind,
@@ -213,16 +221,16 @@ def _of_line(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Document:
         "largest_height_m": round(float(np.abs(errors).max()), 4) if errors.size else None,
     }
     if traced.kind != CONTOUR:
-        off = np.array([float(scene.lines[traced.name].distance(place[:, None])[0]) for place in at[:2].T])
-        document |= {"rms_off_m": _rms(off), "largest_off_m": round(float(off.max()), 4)}
+        distances = np.array([float(scene.lines[traced.name].distance(place[:, None])[0]) for place in at[:2].T])
+        document |= {"rms_off_m": _rms(distances), "largest_off_m": round(float(distances.max()), 4)}
     return document
 
 
-def _height_errors(traced: TracedLine, sheet: CompiledMap, scene: Scene) -> Array:
+def _height_errors(traced: TracedLine, compiled: CompiledMap, scene: Scene) -> Array:
     """Return the height errors of a line at its vertices ``(n,)``, m; positive if too high."""
-    east, north, height = sheet.model.on_ground(traced.readings)
-    drawn = height if traced.height is None else np.full_like(height, traced.height)
-    return np.asarray(drawn - scene.ground.height(east, north))
+    east, north, height = compiled.model.on_ground(traced.readings)
+    line_heights = height if traced.height is None else np.full_like(height, traced.height)
+    return np.asarray(line_heights - scene.ground.height(east, north))
 
 
 def _rms(errors: Array | Sequence[float]) -> float | None:

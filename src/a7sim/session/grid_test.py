@@ -34,7 +34,7 @@ RESIDUAL_COLUMNS = ("projector", "level_mm", "cross", "x_mm", "y_mm", "vx_um", "
 def run_grid_test(
     scenario: Scenario,
     seed: int,
-    order: GridTestPlan,
+    plan: GridTestPlan,
     options: RunOptions | None = None,
 ) -> Document:
     """Test both projectors of a scenario's instrument and return the document; with `out`, write the files.
@@ -46,23 +46,23 @@ def run_grid_test(
     recorded = recorded_session(scenario, seed, options)
     session = recorded.session
     autograph = session.autograph
-    document = _header(scenario, seed, order, autograph)
+    document = _document_header(scenario, seed, plan, autograph)
     options.prepare_folder()
-    sheets: list[ProjectorReadings] = []
+    all_readings: list[ProjectorReadings] = []
     with recorded.recording(
-        make_header("calibrate", scenario, seed, points=order.crosses, levels=order.levels, pointings=order.pointings),
+        make_header("calibrate", scenario, seed, points=plan.crosses, levels=plan.levels, pointings=plan.pointings),
         lambda end: document | end_document(end),
-        lambda: {RESIDUALS: to_csv(RESIDUAL_COLUMNS, _residual_rows(sheets))},
+        lambda: {RESIDUALS: to_csv(RESIDUAL_COLUMNS, _residual_rows(all_readings))},
         subject="test",
     ):
-        for sheet in measure_grid(session.person, order, options.callbacks.on_point, options.callbacks.on_activity):
-            sheets.append(sheet)
-            truth = true_errors(autograph, draw_condition(scenario.instrument, seed), sheet.projector)
-            document["projectors"][side_name(sheet.projector)] = projector_document(sheet, truth)
+        for readings in measure_grid(session.person, plan, options.callbacks.on_point, options.callbacks.on_activity):
+            all_readings.append(readings)
+            truth = true_errors(autograph, draw_condition(scenario.instrument, seed), readings.projector)
+            document["projectors"][side_name(readings.projector)] = projector_document(readings, truth)
     return document | end_document(recorded.end)
 
 
-def _header(scenario: Scenario, seed: int, order: GridTestPlan, autograph: Autograph) -> Document:
+def _document_header(scenario: Scenario, seed: int, plan: GridTestPlan, autograph: Autograph) -> Document:
     return document_header("calibrate") | {
         **request_document(scenario),
         "software": f"a7sim {a7sim.__version__}",
@@ -70,10 +70,10 @@ def _header(scenario: Scenario, seed: int, order: GridTestPlan, autograph: Autog
         "seed": seed,
         "variant": scenario.instrument.variant,
         "serial": scenario.instrument.serial,
-        "plate": order.plate.name,
-        "crosses": len(order.chosen),
-        "levels_mm": order.heights(autograph.variant),
-        "pointings": order.pointings,
+        "plate": plan.plate.name,
+        "crosses": len(plan.chosen),
+        "levels_mm": plan.heights(autograph.variant),
+        "pointings": plan.pointings,
         "status": "failed",
         "message": "",
         "projectors": {},
@@ -83,65 +83,65 @@ def _header(scenario: Scenario, seed: int, order: GridTestPlan, autograph: Autog
 # --- the document -------------------------------------------------------------------------------------
 
 
-def projector_document(sheet: ProjectorReadings, truth: Document) -> Document:
+def projector_document(readings: ProjectorReadings, truth: Document) -> Document:
     """Return the results of a projector, um at photo scale, with the true errors and the differences."""
-    test = sheet.test
-    found = _found(sheet)
+    test = readings.test
+    found = _element_documents(readings)
     residuals = 1e3 * test.residuals[..., 0]
-    names = list(sheet.crosses)
-    worst = np.unravel_index(int(np.hypot(*residuals).argmax()), residuals.shape[1:])
-    observations = [f"{axis} {cross} at {z:g}" for axis in "XY" for z in sheet.heights for cross in names]
+    names = list(readings.crosses)
+    max_index = np.unravel_index(int(np.hypot(*residuals).argmax()), residuals.shape[1:])
+    observations = [f"{axis} {cross} at {z:g}" for axis in "XY" for z in readings.heights for cross in names]
     return {
         "elements": found,
         "held": [name for name in UNKNOWNS if name not in test.errors],
         "s0_um": round(1e3 * float(test.s0[0]), 3),
-        "pointing_um": _known(1e3 * float(sheet.pointing[0])),
+        "pointing_um": _finite(1e3 * float(readings.pointing[0])),
         "largest_residual": {
-            "cross": names[worst[1]],
-            "level_mm": sheet.heights[worst[0]],
-            "um": round(float(np.hypot(*residuals)[worst]), 3),
+            "cross": names[max_index[1]],
+            "level_mm": readings.heights[max_index[0]],
+            "um": round(float(np.hypot(*residuals)[max_index]), 3),
         },
         "residuals_um": {
             cross: [round(float(v), 3) for v in residuals.mean(axis=1)[:, i]] for i, cross in enumerate(names)
         },
-        "statistics": statistics_document(_of_one(sheet), list(test.errors), observations),
-        "finished_at_s": round(float(sheet.finished_at[0]), 1),
+        "statistics": statistics_document(_single_adjustment(readings), list(test.errors), observations),
+        "finished_at_s": round(float(readings.finished_at[0]), 1),
         "truth": truth
         | {"differences": {name: round(found[name]["error"] - truth["errors"][name], 5) for name in test.errors}},
     }
 
 
-def _of_one(sheet: ProjectorReadings) -> Adjustment:
+def _single_adjustment(readings: ProjectorReadings) -> Adjustment:
     """Return the adjustment without its batch axis."""
-    every = sheet.test.adjustment
+    batch = readings.test.adjustment
     unknowns, cofactors, residuals, s0, condition, design = (
         each[..., 0]
-        for each in (every.unknowns, every.cofactors, every.residuals, every.s0, every.condition, every.design)
+        for each in (batch.unknowns, batch.cofactors, batch.residuals, batch.s0, batch.condition, batch.design)
     )
-    return Adjustment(unknowns, cofactors, residuals, every.redundancy, s0, condition, design)
+    return Adjustment(unknowns, cofactors, residuals, batch.redundancy, s0, condition, design)
 
 
-def _found(sheet: ProjectorReadings) -> Document:
+def _element_documents(readings: ProjectorReadings) -> Document:
     elements = {}
-    for name, error in sheet.test.errors.items():
+    for name, error in readings.test.errors.items():
         unit = "gon" if name in SYMBOLS else "mm"
         scale = GON if unit == "gon" else 1.0
         off = float(error[0]) / scale
-        sigma = float(sheet.test.sigmas[name][0]) / scale
+        sigma = float(readings.test.sigmas[name][0]) / scale
         entry: Document = {"error": round(off, 5), "sigma": round(sigma, 5), "unit": unit}
-        counter = sheet.counters.get("bx" if name == "bx" else f"{name}{sheet.projector}")
+        counter = readings.counters.get("bx" if name == "bx" else f"{name}{readings.projector}")
         if counter is not None:
             entry = {"counter": float(counter[0]), "found": round(float(counter[0]) + off, 5)} | entry
         elements[name] = entry
     return elements
 
 
-def _known(value: float) -> float | None:
+def _finite(value: float) -> float | None:
     return round(value, 3) if np.isfinite(value) else None
 
 
-def _residual_rows(sheets: list[ProjectorReadings]) -> Iterator[tuple[str, ...]]:
-    for each in sheets:
+def _residual_rows(all_readings: list[ProjectorReadings]) -> Iterator[tuple[str, ...]]:
+    for each in all_readings:
         residuals = 1e3 * each.test.residuals[..., 0]
         for k, height in enumerate(each.heights):
             for i, (cross, place) in enumerate(each.crosses.items()):
@@ -163,35 +163,35 @@ def true_errors(autograph: Autograph, condition: Condition, projector: int) -> D
     Scales and skews of the carriages look like errors of the projector: X = (1 + sx) Xr + xy Yr + xz Zr and so on
     change c by c ((sx + sy)/2 - sz), the principal point by -c (xz, yz), kappa by xy / 2.
     """
-    centre, turned = autograph.pose(projector)
-    omega, phi, kappa = (float(angle) / GON for angle in angles_of(turned))
+    centre, rotation = autograph.pose(projector)
+    omega, phi, kappa = (float(angle) / GON for angle in angles_of(rotation))
     elements = autograph.variant.elements
-    of_projector = condition.left if projector == 1 else condition.right
-    counted = {name: f"{name}{projector}" for name in ("c", "omega", "phi", "kappa", "by", "bz")}
-    shown = {name: autograph.element(n) if n in elements else 0.0 for name, n in counted.items()}
+    projector_condition = condition.left if projector == 1 else condition.right
+    counter_names = {name: f"{name}{projector}" for name in ("c", "omega", "phi", "kappa", "by", "bz")}
+    counters = {name: autograph.element(n) if n in elements else 0.0 for name, n in counter_names.items()}
     base = autograph.element("bx") if projector == 2 else 0.0
     sx, sy, sz = (1e-6 * ppm for ppm in condition.carriage_scale_ppm)
     xy, xz, yz = (1e-6 * ppm for ppm in condition.carriage_skew_ppm)
-    of_carriages = {
-        "c": shown["c"] * ((sx + sy) / 2.0 - sz),
-        "x0": -shown["c"] * xz,
-        "y0": -shown["c"] * yz,
+    carriage_errors = {
+        "c": counters["c"] * ((sx + sy) / 2.0 - sz),
+        "x0": -counters["c"] * xz,
+        "y0": -counters["c"] * yz,
         "kappa": xy / 2.0 / GON,
     }
-    of_elements = {
-        "c": of_projector.principal_distance_mm,
-        "x0": 1e-3 * of_projector.principal_point_um[0],
-        "y0": 1e-3 * of_projector.principal_point_um[1],
-        "omega": omega + elements[f"omega{projector}"].zero - shown["omega"],
-        "phi": phi + elements[f"phi{projector}"].zero - shown["phi"],
-        "kappa": float(wrap_gon(np.asarray(kappa - shown["kappa"]))),
+    element_errors = {
+        "c": projector_condition.principal_distance_mm,
+        "x0": 1e-3 * projector_condition.principal_point_um[0],
+        "y0": 1e-3 * projector_condition.principal_point_um[1],
+        "omega": omega + elements[f"omega{projector}"].zero - counters["omega"],
+        "phi": phi + elements[f"phi{projector}"].zero - counters["phi"],
+        "kappa": float(wrap_gon(np.asarray(kappa - counters["kappa"]))),
         "bx": float(centre[0]) - base,
-        "by": -float(centre[1]) - shown["by"],
-        "bz": float(centre[2]) - shown["bz"],
+        "by": -float(centre[1]) - counters["by"],
+        "bz": float(centre[2]) - counters["bz"],
     }
     return {
-        "errors": {name: round(error + of_carriages.get(name, 0.0), 5) for name, error in of_elements.items()},
-        "of_the_carriages": {name: round(error, 5) for name, error in of_carriages.items() if error},
+        "errors": {name: round(error + carriage_errors.get(name, 0.0), 5) for name, error in element_errors.items()},
+        "of_the_carriages": {name: round(error, 5) for name, error in carriage_errors.items() if error},
     }
 
 
@@ -209,7 +209,7 @@ def report_tables(document: Document) -> RenderableType:
         ),
     ]
     for projector, each in document["projectors"].items():
-        parts += [Rule(Text(f"{projector} projector"), align="left"), _element_table(each), *_in_words(each)]
+        parts += [Rule(Text(f"{projector} projector"), align="left"), _element_table(each), *_remarks(each)]
     if document["message"]:
         parts.append(Text(f"{document['status']}: {document['message']}", style="bold"))
     return Group(*parts)
@@ -227,7 +227,7 @@ def _element_table(projector: Document) -> Table:
     return table
 
 
-def _in_words(projector: Document) -> Iterator[Text]:
+def _remarks(projector: Document) -> Iterator[Text]:
     largest = projector["largest_residual"]
     pointing = projector["pointing_um"]
     yield Text(
@@ -236,6 +236,6 @@ def _in_words(projector: Document) -> Iterator[Text]:
         + f"; largest residual {largest['um']:.1f} µm at {largest['cross']}, Z {-largest['level_mm']:g} mm"
     )
     if projector["held"]:
-        yield Text(f"held, since one level does not tell them from c, x0 and y0: {', '.join(projector['held'])}")
+        yield Text(f"held, because one level does not separate them from c, x0 and y0: {', '.join(projector['held'])}")
     if projector["truth"]["of_the_carriages"]:
         yield Text("true errors are as the carriages show them; their own scales and skews are in c, x0, y0 and κ")

@@ -43,7 +43,7 @@ class ProgressCallbacks:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a session beside its scenario and seed: folder, progress, journal and link."""
+    """Options of a session other than scenario and seed: folder, progress, journal and link."""
 
     folder: Path | None = None
     """Folder of the files; None if no files are written."""

@@ -53,25 +53,25 @@ def to_geojson(sheet: CompiledMap) -> str:
     return json.dumps(collection, indent=1, ensure_ascii=False) + "\n"
 
 
-def _common(sheet: CompiledMap) -> dict[str, Any]:
+def _common_properties(sheet: CompiledMap) -> dict[str, Any]:
     return {"model": sheet.record.model.name, "scale": round(sheet.map_scale)}
 
 
 def _line_feature(traced: TracedLine, sheet: CompiledMap) -> dict[str, Any]:
-    at = sheet.model.on_ground(traced.readings)
+    coordinates = sheet.model.on_ground(traced.readings)
     if traced.height is not None:
-        at = np.array([at[0], at[1], np.full(at.shape[1], traced.height)])
+        coordinates = np.array([coordinates[0], coordinates[1], np.full(coordinates.shape[1], traced.height)])
     sigma = sheet.sigma_height if traced.kind == CONTOUR else sheet.sigma_plan
-    properties = {"name": traced.name, "kind": traced.kind, "height": traced.height, **_common(sheet)}
+    properties = {"name": traced.name, "kind": traced.kind, "height": traced.height, **_common_properties(sheet)}
     properties |= {"sigma": round(sigma, 4), "closed": traced.closed, "endings": list(traced.endings)}
-    return _feature("LineString", [_metres(place) for place in at.T], properties)
+    return _feature("LineString", [_rounded_metres(place) for place in coordinates.T], properties)
 
 
 def _spot_features(sheet: CompiledMap) -> Iterator[dict[str, Any]]:
     for place in sheet.model.on_ground(sheet.spots.readings).reshape(3, -1).T:
         if np.isfinite(place).all():
-            properties = {"kind": "spot height", "height": round(float(place[2]), 3), **_common(sheet)}
-            yield _feature("Point", _metres(place), properties | {"sigma": round(sheet.sigma_height, 4)})
+            properties = {"kind": "spot height", "height": round(float(place[2]), 3), **_common_properties(sheet)}
+            yield _feature("Point", _rounded_metres(place), properties | {"sigma": round(sheet.sigma_height, 4)})
 
 
 def _control_features(sheet: CompiledMap) -> Iterator[dict[str, Any]]:
@@ -84,17 +84,17 @@ def _control_features(sheet: CompiledMap) -> Iterator[dict[str, Any]]:
                 "kind": "control",
                 "role": role,
                 "height": height,
-                **_common(sheet),
+                **_common_properties(sheet),
                 "sigma": 0.0,
             }
-            yield _feature("Point", _metres(place[: 2 if height is None else 3]), properties)
+            yield _feature("Point", _rounded_metres(place[: 2 if height is None else 3]), properties)
 
 
 def _feature(geometry: str, coordinates: Any, properties: dict[str, Any]) -> dict[str, Any]:
     return {"type": "Feature", "geometry": {"type": geometry, "coordinates": coordinates}, "properties": properties}
 
 
-def _metres(place: Array) -> list[float]:
+def _rounded_metres(place: Array) -> list[float]:
     return [round(float(value), 3) for value in place]
 
 
@@ -121,14 +121,14 @@ class _Paper:
         width, height = self.high - self.low
         return float(width) + 2.0 * _MARGIN_MM, float(height) + _HEAD_MM + _FOOT_MM
 
-    def drawn(self, readings: Array) -> Array:
+    def on_paper(self, readings: Array) -> Array:
         """Return positions on the paper ``(2, n)`` of readings ``(2 or 3, n)``, as the table's pencil draws them."""
         x, y = self.sheet.on_table(readings)
         return np.array([x - self.low[0] + _MARGIN_MM, self.high[1] - y + _HEAD_MM])
 
     def of_ground(self, ground: Array) -> Array:
         """Return positions on the paper ``(2, n)`` of ground coordinates ``(3, n)``."""
-        return self.drawn(self.sheet.model.readings_of(ground))
+        return self.on_paper(self.sheet.model.readings_of(ground))
 
 
 def _corners(sheet: CompiledMap) -> Array:
@@ -173,7 +173,7 @@ def _description(sheet: CompiledMap) -> str:
 
 def _corners_on(paper: _Paper) -> Array:
     (x0, y0), (x1, y1) = paper.sheet.area.low, paper.sheet.area.high
-    return paper.drawn(np.array([[x0, x1, x1, x0], [y0, y0, y1, y1]]))
+    return paper.on_paper(np.array([[x0, x1, x1, x0], [y0, y0, y1, y1]]))
 
 
 def _points(places: Array) -> str:
@@ -199,10 +199,10 @@ def _contours(paper: _Paper) -> Iterator[str]:
     for traced in paper.sheet.lines:
         if traced.kind != CONTOUR or traced.height is None or traced.readings.shape[1] < 2:
             continue
-        places = paper.drawn(traced.readings)
-        heavier = " index" if traced.height in index else ""
+        places = paper.on_paper(traced.readings)
+        index_class = " index" if traced.height in index else ""
         tag = "polygon" if traced.closed else "polyline"
-        yield f'<{tag} class="contour{heavier}" points="{_points(places[:, :-1] if traced.closed else places)}"/>'
+        yield f'<{tag} class="contour{index_class}" points="{_points(places[:, :-1] if traced.closed else places)}"/>'
         if traced.height in labelled:
             labels += _label(places, f"{traced.height:g}")
     yield from labels
@@ -228,7 +228,7 @@ def _roads(paper: _Paper) -> Iterator[str]:
             for traced in (each for each in lines if each.kind == kind):
                 yield (
                     f'<polyline class="{symbol}" stroke-width="{width}" '
-                    f'points="{_points(paper.drawn(traced.readings))}">'
+                    f'points="{_points(paper.on_paper(traced.readings))}">'
                     f"<title>{escape(traced.name)}</title></polyline>"
                 )
     yield "</g>"
@@ -240,7 +240,7 @@ def _spots(paper: _Paper) -> Iterator[str]:
     for i in range(1, heights.shape[0] - 1, 2):
         for j in range(1, heights.shape[1] - 1, 2):
             if math.isfinite(heights[i, j]):
-                ((x,), (y,)) = paper.drawn(readings[:, i, j][:, None])
+                ((x,), (y,)) = paper.on_paper(readings[:, i, j][:, None])
                 yield f'<circle class="spot" cx="{x:.2f}" cy="{y:.2f}" r="0.25"/>'
                 yield f'<text x="{x + 0.6:.2f}" y="{y + 0.5:.2f}">{heights[i, j]:.1f}</text>'
     yield "</g>"
@@ -342,18 +342,18 @@ def _legend(sheet: CompiledMap) -> list[str]:
 
 def _scale_bar(paper: _Paper, y: float) -> Iterator[str]:
     step = _round_below(0.02 * paper.sheet.map_scale)
-    one = 1e3 * step / paper.sheet.map_scale
+    step_mm = 1e3 * step / paper.sheet.map_scale
     yield '<g id="scale-bar">'
     for k in range(4):
         fill = "#222" if k % 2 == 0 else "#fff"
         yield (
-            f'<rect class="bar" x="{_MARGIN_MM + k * one:.3f}" y="{y:.2f}" width="{one:.3f}" height="1.4" '
+            f'<rect class="bar" x="{_MARGIN_MM + k * step_mm:.3f}" y="{y:.2f}" width="{step_mm:.3f}" height="1.4" '
             f'fill="{fill}"/>'
         )
     for k in range(5):
         unit = " m" if k == 4 else ""
         yield (
-            f'<text class="small" text-anchor="middle" x="{_MARGIN_MM + k * one:.3f}" y="{y + 4.4:.2f}">'
+            f'<text class="small" text-anchor="middle" x="{_MARGIN_MM + k * step_mm:.3f}" y="{y + 4.4:.2f}">'
             f"{k * step:g}{unit}</text>"
         )
     yield "</g>"

@@ -89,9 +89,9 @@ def model_document(result: ModelResult) -> Document:
     record = result.record
     orientation = record.orientation
     model = record.model
-    found = {hand: _centre(centre) for hand, centre in record.centres.items()}
+    measured_centres = {side: _centre_document(centre) for side, centre in record.centres.items()}
     return {
-        **_head_of(record),
+        **_model_heading(record),
         "interior_orientation": [
             {
                 "photo": each.photograph,
@@ -122,11 +122,11 @@ def model_document(result: ModelResult) -> Document:
             "residual_parallax_mm": _rounded(orientation.residuals),
             "elements": dict(orientation.elements),
         },
-        "perspective_centres": {SIDES[hand]: centre for hand, centre in found.items()},
-        "points": _points(record),
+        "perspective_centres": {SIDES[side]: centre for side, centre in measured_centres.items()},
+        "points": _points_document(record),
         "standard_points": dict(model.standard_points),
-        **({"absolute_orientation": _on_ground(record.on_ground)} if record.on_ground else {}),
-        "truth": _beside_truth(result, found) | _published_sigmas(result.published),
+        **({"absolute_orientation": _ground_document(record.on_ground)} if record.on_ground else {}),
+        "truth": _truth_document(result, measured_centres) | _published_sigmas(result.published),
     }
 
 
@@ -134,20 +134,20 @@ def brief_model_document(result: ModelResult) -> Document:
     """Return the results of a model needed by its strip and by the named responses of a study."""
     record = result.record
     orientation = record.orientation
-    found = {hand: _centre(centre, _CENTRE_FIELDS[:3]) for hand, centre in record.centres.items()}
+    measured_centres = {side: _centre_document(centre, _CENTRE_FIELDS[:3]) for side, centre in record.centres.items()}
     return {
-        **_head_of(record),
+        **_model_heading(record),
         "relative_orientation": {
             "iterations": len(orientation.rounds),
             "rms_parallax_mm": round(orientation.rms, 6),
         },
-        "perspective_centres": {SIDES[hand]: centre for hand, centre in found.items()},
-        "points": _points(record),
-        "truth": _differences(result, found),
+        "perspective_centres": {SIDES[side]: centre for side, centre in measured_centres.items()},
+        "points": _points_document(record),
+        "truth": _truth_differences(result, measured_centres),
     }
 
 
-def _head_of(record: ModelRecord) -> dict[str, Any]:
+def _model_heading(record: ModelRecord) -> dict[str, Any]:
     model = record.model
     return {
         "model": model.name,
@@ -160,7 +160,7 @@ def _head_of(record: ModelRecord) -> dict[str, Any]:
     }
 
 
-def _points(record: ModelRecord) -> dict[str, dict[str, float]]:
+def _points_document(record: ModelRecord) -> dict[str, dict[str, float]]:
     return {
         point: {axis: round(value, POINT_DECIMALS) for axis, value in zip("XYZ", coordinates, strict=True)}
         for point, coordinates in record.points.items()
@@ -212,32 +212,32 @@ def _hours(seconds: Mapping[str, float]) -> dict[str, float]:
     return {name: round(each / 3600.0, 4) for name, each in seconds.items()}
 
 
-def _on_ground(found: GroundOrientation) -> dict[str, Any]:
+def _ground_document(orientation: GroundOrientation) -> dict[str, Any]:
     return {
-        "scale_number": found.scale_number,
-        "height_gear": found.height_gear,
+        "scale_number": orientation.scale_number,
+        "height_gear": orientation.height_gear,
         "rounds": [
             {
                 "height_rms_m": round(each.height_rms, 4),
                 "scale": round(each.scale, 6),
                 "tilts_gon": [round(tilt, 4) for tilt in each.tilts],
             }
-            for each in found.rounds
+            for each in orientation.rounds
         ],
-        "elements": dict(found.elements),
-        "elements_before": dict(found.before),
-        "heights_m": {point: round(off, 3) for point, off in found.heights.items()},
-        "distance_m": round(found.distance, 3),
-        "tolerated_m": round(found.tolerated, 3),
-        "agrees": found.within_tolerance,
+        "elements": dict(orientation.elements),
+        "elements_before": dict(orientation.before),
+        "heights_m": {point: round(off, 3) for point, off in orientation.heights.items()},
+        "distance_m": round(orientation.distance, 3),
+        "tolerated_m": round(orientation.tolerated, 3),
+        "agrees": orientation.within_tolerance,
         "points": {
             point: {axis: round(value, 3) for axis, value in zip("XYZ", place, strict=True)}
-            for point, place in found.points.items()
+            for point, place in orientation.points.items()
         },
     }
 
 
-def _centre(centre: PerspectiveCentre, fields: Sequence[str] = _CENTRE_FIELDS) -> dict[str, float]:
+def _centre_document(centre: PerspectiveCentre, fields: Sequence[str] = _CENTRE_FIELDS) -> dict[str, float]:
     return {name: round(float(getattr(centre, name)), CENTRE_DECIMALS) for name in fields}
 
 
@@ -245,17 +245,17 @@ def _rounded(values: Any) -> dict[str, float]:
     return {name: round(value, 6) for name, value in values.items()}
 
 
-def _beside_truth(result: ModelResult, found: dict[int, dict[str, float]]) -> dict[str, Any]:
-    beside, member = result.comparison, result.member
+def _truth_document(result: ModelResult, measured_centres: dict[int, dict[str, float]]) -> dict[str, Any]:
+    comparison, member = result.comparison, result.member
     centres = {
-        SIDES[hand]: {name: round(float(each[member]), 5) for name, each in beside.centres[hand].items()}
-        for hand in found
+        SIDES[side]: {name: round(float(each[member]), 5) for name, each in comparison.centres[side].items()}
+        for side in measured_centres
     }
-    differences = _differences(result, found)
-    relative = beside.relative
+    differences = _truth_differences(result, measured_centres)
+    relative = comparison.relative
     if relative is None:
         return {"centres": centres, **differences}
-    exact = {name: float(each[member]) for name, each in relative.elements.items()}
+    true_elements = {name: float(each[member]) for name, each in relative.elements.items()}
     elements = result.record.orientation.elements
     return {
         "centres": centres,
@@ -266,29 +266,29 @@ def _beside_truth(result: ModelResult, found: dict[int, dict[str, float]]) -> di
         "found_relative_rotation": _matrix(relative.found.rotation[..., member]),
         "found_base_direction": _vector(relative.found.base[..., member]),
         **differences,
-        "elements": _rounded(exact),
+        "elements": _rounded(true_elements),
         "element_differences": {
-            name: round((elements[name] - value + 200.0) % 400.0 - 200.0, 6) for name, value in exact.items()
+            name: round((elements[name] - value + 200.0) % 400.0 - 200.0, 6) for name, value in true_elements.items()
         },
     }
 
 
-def _differences(result: ModelResult, found: dict[int, dict[str, float]]) -> dict[str, Any]:
+def _truth_differences(result: ModelResult, measured_centres: dict[int, dict[str, float]]) -> dict[str, Any]:
     """Return the differences of the results from the truth as single numbers."""
-    beside, member = result.comparison, result.member
+    comparison, member = result.comparison, result.member
     document: dict[str, Any] = {
         "centre_differences": {
-            SIDES[hand]: {
-                name: round(centre[name] - float(each[member]), 5) for name, each in beside.centres[hand].items()
+            SIDES[side]: {
+                name: round(centre[name] - float(each[member]), 5) for name, each in comparison.centres[side].items()
             }
-            for hand, centre in found.items()
+            for side, centre in measured_centres.items()
         }
     }
-    if beside.relative is None:
+    if comparison.relative is None:
         return document
     return document | {
-        "rotation_difference_gon": round(float(beside.relative.rotation_gon[member]), 5),
-        "base_difference_gon": round(float(beside.relative.base_gon[member]), 5),
+        "rotation_difference_gon": round(float(comparison.relative.rotation_gon[member]), 5),
+        "base_difference_gon": round(float(comparison.relative.base_gon[member]), 5),
     }
 
 
@@ -309,33 +309,48 @@ def _matrix(values: Array) -> list[list[float]]:
 
 def models_csv(models: Sequence[Model]) -> str:
     """Return model coordinates and centres in mm, Z upward."""
-    rows = ((model.name, name, *_mm(*at)) for model in models for name, at in _named(model))
+    rows = ((model.name, name, *_mm(*at)) for model in models for name, at in _named_points(model))
     return "# mm at model scale, Z up\n" + to_csv(("model", "point", "X", "Y", "Z"), rows)
 
 
 def points_csv(model: Model) -> str:
     """Return the points of a strip in the system of the ground, m."""
-    return to_csv(("point", "X", "Y", "Z"), ((name, *_mm(*at)) for name, at in _named(model)))
+    return to_csv(("point", "X", "Y", "Z"), ((name, *_mm(*at)) for name, at in _named_points(model)))
 
 
-def _named(model: Model) -> Iterator[tuple[str, list[float]]]:
+def _named_points(model: Model) -> Iterator[tuple[str, list[float]]]:
     return zip(model.points, model.coordinates.T.tolist(), strict=True)
 
 
 def strips_csv(strips: Sequence[Document]) -> str:
     """Return the accuracies of all strips in m, one per line."""
-    header = ("strip", "cases", "scale", "max_join_mm", *(f"{on}_{what}_m" for on in ON for what in WHAT))
+    header = (
+        "strip",
+        "cases",
+        "scale",
+        "max_join_mm",
+        *(f"{group}_{direction}_m" for group in POINT_GROUPS for direction in DIRECTIONS),
+    )
     return to_csv(header, (_strip_row(strip) for strip in strips))
 
 
 def _strip_row(strip: Document) -> tuple[str, ...]:
     accuracy = strip["accuracy_m"]
-    worst = max((join["max_residual_mm"] for join in strip["joins"]), default=0.0)
-    cells = [accuracy[on][what] if on in accuracy else math.nan for on in ON for what in WHAT]
-    return str(strip["number"]), "".join(strip["cases"]), f"{strip['absolute']['scale']:.7f}", *_mm(worst, *cells)
+    max_residual_mm = max((join["max_residual_mm"] for join in strip["joins"]), default=0.0)
+    cells = [
+        accuracy[group][direction] if group in accuracy else math.nan
+        for group in POINT_GROUPS
+        for direction in DIRECTIONS
+    ]
+    return (
+        str(strip["number"]),
+        "".join(strip["cases"]),
+        f"{strip['absolute']['scale']:.7f}",
+        *_mm(max_residual_mm, *cells),
+    )
 
 
-ON, WHAT = ("control", "checks"), ("plan", "height")
+POINT_GROUPS, DIRECTIONS = ("control", "checks"), ("plan", "height")
 
 
 def _mm(*values: float) -> tuple[str, ...]:

@@ -66,8 +66,8 @@ def run_combinations(scenario: Scenario, seed: int, options: RunOptions | None =
 
 def with_case(scenario: Scenario, case: str) -> Scenario:
     """Return a scenario whose models are all oriented on the points of a case."""
-    of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
-    return amend_provenance(of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
+    scenario_of_case = msgspec.structs.replace(scenario, plotting=msgspec.structs.replace(scenario.plan, case=case))
+    return amend_provenance(scenario_of_case, "--strips all", f"--case {case}", {"plan.case": f'"{case}"'})
 
 
 def check_strips_possible(scenario: Scenario) -> None:
@@ -85,7 +85,7 @@ def _strips(scenario: Scenario, seed: int, sessions: Mapping[str, SessionResult]
     scene = build_scene(scenario, seed)
     ground, jobs = ground_control(scenario, scene), make_job(scenario, scene).models
     by_case = {case: session.strip_models for case, session in sessions.items()}
-    return [_of_combination(each, jobs, ground, scenario.strip) for each in combinations(by_case)]
+    return [_combination_document(each, jobs, ground, scenario.strip) for each in combinations(by_case)]
 
 
 def combinations(by_case: Mapping[str, Sequence[Model]]) -> Iterator[Combination]:
@@ -95,14 +95,18 @@ def combinations(by_case: Mapping[str, Sequence[Model]]) -> Iterator[Combination
         yield Combination(number, cases, tuple(by_case[case][i] for i, case in enumerate(cases)))
 
 
-def _of_combination(combination: Combination, jobs: Sequence[ModelJob], ground: Ground, plan: StripPlan) -> Document:
-    described = {
+def _combination_document(
+    combination: Combination, jobs: Sequence[ModelJob], ground: Ground, plan: StripPlan
+) -> Document:
+    description = {
         "number": combination.number,
         "cases": list(combination.cases),
         "in_words": describe(combination, jobs),
     }
     try:
-        return described | oriented_strip_document(orient_strip(combination.models, ground, plan.join, plan.polynomial))
+        return description | oriented_strip_document(
+            orient_strip(combination.models, ground, plan.join, plan.polynomial)
+        )
     except Undetermined as undetermined:
         raise A7SimError(f"strip {combination.number}: {undetermined}") from undetermined
 

@@ -40,7 +40,7 @@ COLUMN_MM = 300.0
 """Zin, to which P refers the glass scale (P 3.2)."""
 
 REFERENCE_MM = 400.0
-"""Reading of the glass scale there [assumption: an integer in its middle]."""
+"""Reading of the glass scale at the column reading [assumption: an integer in its middle]."""
 
 C_STEP_MM = 0.01
 """Least count of the principal distance."""
@@ -60,11 +60,11 @@ def centre_photo(
     """Centre a photograph by its fiducials and set the principal distance for the size of its film."""
     camera = photograph.camera
     marks = calibrated_fiducials(photograph)
-    seen = photograph.fiducials.xy + 1e-3 * observer.fiducial_um * rng.standard_normal(marks.shape)
-    lie = picture_placement(seen - marks, marks)
-    shift = np.array([lie.dx, lie.dy]) + np.array(camera.principal_point)
-    centred = plane_rotation(-lie.turn) @ mark_coordinates(photograph.points, names) - shift[:, None]
-    return CentredPhoto(centred, float(round_to_count(np.array(camera.c * (1.0 + lie.scale)), C_STEP_MM)))
+    observed = photograph.fiducials.xy + 1e-3 * observer.fiducial_um * rng.standard_normal(marks.shape)
+    placement = picture_placement(observed - marks, marks)
+    shift = np.array([placement.dx, placement.dy]) + np.array(camera.principal_point)
+    centred = plane_rotation(-placement.turn) @ mark_coordinates(photograph.points, names) - shift[:, None]
+    return CentredPhoto(centred, float(round_to_count(np.array(camera.c * (1.0 + placement.scale)), C_STEP_MM)))
 
 
 @dataclass(frozen=True)
@@ -78,11 +78,11 @@ class A8Setup:
     rng: np.random.Generator
 
     def set_up(
-        self, model: ModelPlan, scene: Scene, wanted: frozenset[str], standard: frozenset[str]
+        self, model: ModelPlan, scene: Scene, point_names: frozenset[str], standard: frozenset[str]
     ) -> "ProjectedPair":
         """Mount the photographs of a model; draw the errors of projection and observation."""
         photographs = scene.photographs[model.left], scene.photographs[model.right]
-        names = common_points(photographs[0].points, photographs[1].points, wanted)
+        names = common_points(photographs[0].points, photographs[1].points, point_names)
         pictures = tuple(centre_photo(each, names, self.observer, self.rng) for each in photographs)
         left, right = (
             projector.project(picture.image, self.rng)
@@ -92,42 +92,42 @@ class A8Setup:
             picture.c + projector.principal_distance_error
             for projector, picture in zip(self.projectors, pictures, strict=True)
         )
-        oriented_on = [i for i, name in enumerate(names) if name in standard]
+        orientation_points = [i for i, name in enumerate(names) if name in standard]
         sigma = 1e-3 * self.observer.parallax_um / np.sqrt(self.readings_of_parallax)
-        errors = sigma * self.rng.standard_normal(len(oriented_on))
+        errors = sigma * self.rng.standard_normal(len(orientation_points))
         pointing = pointing_errors((3, len(names)), self.observer.repeat_share, POINTINGS, self.rng)
-        return ProjectedPair(model, names, left, right, (c[0], c[1]), oriented_on, errors, pointing)
+        return ProjectedPair(model, names, left, right, (c[0], c[1]), orientation_points, errors, pointing)
 
-    def cleared(self, models: Sequence["ProjectedPair"]) -> list[ClearedPair]:
+    def clear(self, models: Sequence["ProjectedPair"]) -> list[ClearedPair]:
         """Clear the parallaxes of models, together for models with the same number of orientation points."""
-        if len({len(each.oriented_on) for each in models}) == 1:
+        if len({len(each.orientation_points) for each in models}) == 1:
             left, right = (np.stack([each.at_standard_points[side] for each in models], axis=-1) for side in range(2))
             c1, c2 = np.array([each.c for each in models]).T
             try:
-                stands = clear_parallaxes(
+                cleared_pairs = clear_parallaxes(
                     left, right, (c1, c2), self.bx, np.stack([each.errors for each in models], axis=-1)
                 )
             except Undetermined:
                 pass
             else:
-                return [stands.of(i) for i in range(len(models))]
-        alone = []
+                return [cleared_pairs.of(i) for i in range(len(models))]
+        cleared_singly = []
         for each in models:
             with errors_for_model(each.model.name):
-                alone.append(clear_parallaxes(*each.at_standard_points, each.c, self.bx, each.errors))
-        return alone
+                cleared_singly.append(clear_parallaxes(*each.at_standard_points, each.c, self.bx, each.errors))
+        return cleared_singly
 
-    def measured(self, shown: "ProjectedPair", stand: ClearedPair) -> Model:
+    def measure(self, pair: "ProjectedPair", cleared_pair: ClearedPair) -> Model:
         """Return a model with all its points, mm at its scale."""
-        readings = self._read(stand.model_points(shown.left, shown.right)[0], stand, shown.pointing)
+        readings = self._read(cleared_pair.model_points(pair.left, pair.right)[0], cleared_pair, pair.pointing)
         centres = np.array(a8_centres(self.bx, COLUMN_MM, REFERENCE_MM)).T
         points, ends = (a8_model_coordinates(each, self.bx, COLUMN_MM, REFERENCE_MM) for each in (readings, centres))
-        return add_centres(shown.model, shown.names, points, ends)
+        return add_centres(pair.model, pair.names, points, ends)
 
-    def _read(self, points: Array, stand: ClearedPair, pointing: Array) -> Array:
+    def _read(self, points: Array, cleared_pair: ClearedPair, pointing: Array) -> Array:
         """Return the scale readings ``(3, n)`` of points ``(3, n)`` from the left centre, with pointing errors."""
         observer = self.observer
-        enlargement = -points[2] / stand.c[0]
+        enlargement = -points[2] / cleared_pair.c[0]
         plan = 1e-3 * observer.stereo_um * enlargement
         height = 1e-3 * observer.height_um * enlargement * -points[2] / self.bx
         x, y, z = points[..., None] + np.array([plan, plan, height])[..., None] * pointing
@@ -145,8 +145,8 @@ class ProjectedPair:
     right: Array
     """Image points ``(2, n)`` about the principal points, mm."""
     c: tuple[float, float]
-    oriented_on: list[int]
-    """Standard points among them."""
+    orientation_points: list[int]
+    """Indices of the standard points on which the model is oriented."""
     errors: Array
     """Errors of clearing their parallaxes, mm in the picture."""
     pointing: Array
@@ -155,7 +155,7 @@ class ProjectedPair:
     @property
     def at_standard_points(self) -> tuple[Array, Array]:
         """Image points of both photographs on which the model is oriented."""
-        return self.left[:, self.oriented_on], self.right[:, self.oriented_on]
+        return self.left[:, self.orientation_points], self.right[:, self.orientation_points]
 
 
 def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
@@ -166,23 +166,25 @@ def strip_on_a8(scenario: Scenario, scene: Scene, seed: int) -> StripResult:
     A7SimError for measurements that form no strip.
     """
     plan = scenario.plan
-    faults, person = (
+    instrument_rng, operator_rng = (
         np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(stream,)))
         for stream in (INSTRUMENT_STREAM, OPERATOR_STREAM)
     )
     test = scenario.instrument.grid_test
     a8 = A8Setup(
-        (Projector.sample(test, faults), Projector.sample(test, faults)),
+        (Projector.sample(test, instrument_rng), Projector.sample(test, instrument_rng)),
         scenario.observer,
         plan.bx,
         plan.parallax_readings,
-        person,
+        operator_rng,
     )
-    wanted = measured_points(scenario, scene, plan.case)
-    shown = [
-        a8.set_up(model, scene, wanted, frozenset(positions[label] for label in CASES[plan.case] if label in positions))
+    point_names = measured_points(scenario, scene, plan.case)
+    pairs = [
+        a8.set_up(
+            model, scene, point_names, frozenset(positions[label] for label in CASES[plan.case] if label in positions)
+        )
         for model in scenario.models
         for positions in [scene.standard_points[model.name]]
     ]
-    models = tuple(a8.measured(each, stand) for each, stand in zip(shown, a8.cleared(shown), strict=True))
+    models = tuple(a8.measure(pair, cleared_pair) for pair, cleared_pair in zip(pairs, a8.clear(pairs), strict=True))
     return orient_measured_strip(models, scenario, scene)

@@ -37,23 +37,23 @@ class StripComparison:
 
 
 def compare_a8_to_comparator(scenario: Scenario, seeds: Iterable[int]) -> StripComparison:
-    """Return the residuals of both methods at the check points, over seeds;
+    """Return the residuals of both methods at the check points, over seeds.
 
-    each seed has its own film, A8 and observers.
+    Each seed has its own film, A8 and observers.
     """
     seeds = tuple(seeds)
-    both: list[tuple[StripResult, StripResult]] = []
+    results: list[tuple[StripResult, StripResult]] = []
     for seed in seeds:
         scene = build_scene(scenario, seed)
-        both.append((strip_by_comparator(scenario, scene, seed), strip_on_a8(scenario, scene, seed)))
+        results.append((strip_by_comparator(scenario, scene, seed), strip_on_a8(scenario, scene, seed)))
     c = scenario.camera.c
-    apart = [coordinate_differences(*pair) for pair in both]
+    differences = [coordinate_differences(*pair) for pair in results]
     return StripComparison(
         seeds,
-        _residuals([comparator for comparator, _ in both], c),
-        _residuals([a8 for _, a8 in both], c),
-        np.array([root_mean_square(each) for each in apart]).T,
-        np.array([max_abs_residual(each) for each in apart]).T,
+        _residuals([comparator for comparator, _ in results], c),
+        _residuals([a8 for _, a8 in results], c),
+        np.array([root_mean_square(each) for each in differences]).T,
+        np.array([max_abs_residual(each) for each in differences]).T,
     )
 
 
@@ -81,8 +81,12 @@ def _closing(result: StripResult, c: float) -> tuple[float, float]:
 
 def coordinate_differences(comparator: StripResult, a8: StripResult) -> Array:
     """Return A8 minus comparator ``(3, n)`` at the points that are neither control nor centres."""
-    one, other = comparator.strip.points, a8.strip.points
+    comparator_points, a8_points = comparator.strip.points, a8.strip.points
     ground = comparator.strip.oriented.fit.ground
     control = {name for name, role in zip(ground.points, ground.roles, strict=True) if role != "check"}
-    names = sorted(name for name in set(one.points) & set(other.points) if not is_centre(name) and name not in control)
-    return np.asarray(other.at(names) - one.at(names))
+    names = sorted(
+        name
+        for name in set(comparator_points.points) & set(a8_points.points)
+        if not is_centre(name) and name not in control
+    )
+    return np.asarray(a8_points.at(names) - comparator_points.at(names))

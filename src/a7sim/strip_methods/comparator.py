@@ -56,21 +56,21 @@ def strip_by_comparator(scenario: Scenario, scene: Scene, seed: int) -> StripRes
     if in the scenario, are corrected with the heights of a first strip computed without. Raises Undetermined or
     A7SimError for measurements that form no strip.
     """
-    wanted = measured_points(scenario, scene, scenario.comparator.case)
-    pairs = _in_pairs(scenario, scene, wanted, seed)
-    of_lens = partial(_of_lens, scenario=scenario)
-    result = _strip_of([pair.corrected(of_lens, of_lens) for pair in pairs], scenario, scene)
+    point_names = measured_points(scenario, scene, scenario.comparator.case)
+    pairs = _measure_pairs(scenario, scene, point_names, seed)
+    correct_lens = partial(_correct_lens, scenario=scenario)
+    result = _orient_pairs([pair.corrected(correct_lens, correct_lens) for pair in pairs], scenario, scene)
     if not (scenario.air.refraction or scenario.air.earth_curvature):
         return result
     first = result.strip.oriented.model
     ground_height = float(first.at([name for name in first.points if not is_centre(name)])[2].mean())
 
-    def of_air(photograph: str) -> Callable[[Array], Array]:
+    def correct_air(photograph: str) -> Callable[[Array], Array]:
         flying_height = float(first.at([photograph + CENTRE])[2, 0])
-        return partial(_of_air, scenario=scenario, flying_height=flying_height, ground_height=ground_height)
+        return partial(_correct_air, scenario=scenario, flying_height=flying_height, ground_height=ground_height)
 
-    again = [pair.corrected(of_air(pair.model.left), of_air(pair.model.right)) for pair in pairs]
-    return _strip_of(again, scenario, scene)
+    corrected_pairs = [pair.corrected(correct_air(pair.model.left), correct_air(pair.model.right)) for pair in pairs]
+    return _orient_pairs(corrected_pairs, scenario, scene)
 
 
 def measured_points(scenario: Scenario, scene: Scene, case: str) -> frozenset[str]:
@@ -81,16 +81,16 @@ def measured_points(scenario: Scenario, scene: Scene, case: str) -> frozenset[st
     }
 
 
-def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: int) -> list[ImagePair]:
+def _measure_pairs(scenario: Scenario, scene: Scene, point_names: frozenset[str], seed: int) -> list[ImagePair]:
     """Return the pairs of a scenario as measured."""
     comparator, observer = scenario.comparator, scenario.observer
     if comparator.kind == "stereo":
         return [
-            _measured_in_stereo(model, scene, wanted, observer, comparator, _stream(seed, index))
+            _measure_in_stereo(model, scene, point_names, observer, comparator, _stream(seed, index))
             for index, model in enumerate(scenario.models)
         ]
     measured = {
-        name: _measured_alone(photograph, observer, comparator, _stream(seed, index))
+        name: _measure_singly(photograph, observer, comparator, _stream(seed, index))
         for index, (name, photograph) in enumerate(scene.photographs.items())
     }
     return [
@@ -98,43 +98,45 @@ def _in_pairs(scenario: Scenario, scene: Scene, wanted: frozenset[str], seed: in
             model, names, mark_coordinates(measured[model.left], names), mark_coordinates(measured[model.right], names)
         )
         for model in scenario.models
-        for names in [common_points(measured[model.left], measured[model.right], wanted)]
+        for names in [common_points(measured[model.left], measured[model.right], point_names)]
     ]
 
 
-def _measured_alone(
+def _measure_singly(
     photograph: Photograph, observer: Observer, comparator: Comparator, rng: np.random.Generator
 ) -> NamedPoints:
     """Return all points of a photograph from a monocomparator."""
-    stage = _Stage.laid(photograph, observer, comparator, rng)
-    seen = simulate_pointings(
+    stage = _Stage.mount(photograph, observer, comparator, rng)
+    observed = simulate_pointings(
         stage.at(photograph.points.xy), 1e-3 * observer.monocular_um, observer.repeat_share, comparator.pointings, rng
     )
-    return NamedPoints(photograph.points.names, stage.read(seen))
+    return NamedPoints(photograph.points.names, stage.read(observed))
 
 
-def _measured_in_stereo(
+def _measure_in_stereo(
     model: ModelPlan,
     scene: Scene,
-    wanted: frozenset[str],
+    point_names: frozenset[str],
     observer: Observer,
     comparator: Comparator,
     rng: np.random.Generator,
 ) -> ImagePair:
     """Return the points of a pair from a stereocomparator: x', y' of the left image, and px, py to the right one."""
     photographs = scene.photographs[model.left], scene.photographs[model.right]
-    names = common_points(photographs[0].points, photographs[1].points, wanted)
-    stages = [_Stage.laid(each, observer, comparator, rng) for each in photographs]
+    names = common_points(photographs[0].points, photographs[1].points, point_names)
+    stages = [_Stage.mount(each, observer, comparator, rng) for each in photographs]
     left, right = (
         stage.at(mark_coordinates(each.points, names)) for stage, each in zip(stages, photographs, strict=True)
     )
     share, pointings = observer.repeat_share, comparator.pointings
-    seen = simulate_pointings(left, 1e-3 * observer.stereo_um, share, pointings, rng)
+    observed = simulate_pointings(left, 1e-3 * observer.stereo_um, share, pointings, rng)
     px = simulate_pointings((right - left)[:1], 1e-3 * observer.height_um, share, pointings, rng)
     py = simulate_pointings((right - left)[1:], 1e-3 * observer.parallax_um, 1.0, pointings, rng)
     step = 1e-3 * comparator.least_count_um
     parallaxes = round_to_count(np.concatenate([px, py]), step)
-    return ImagePair(model, names, stages[0].read(seen), stages[1].read(round_to_count(seen, step) + parallaxes))
+    return ImagePair(
+        model, names, stages[0].read(observed), stages[1].read(round_to_count(observed, step) + parallaxes)
+    )
 
 
 @dataclass(frozen=True)
@@ -147,25 +149,25 @@ class _Stage:
     fit: PlaneFit
 
     @classmethod
-    def laid(
+    def mount(
         cls, photograph: Photograph, observer: Observer, comparator: Comparator, rng: np.random.Generator
     ) -> "_Stage":
         turn, shift = plane_rotation(STAGE_TURN * rng.standard_normal()), STAGE_MM + rng.standard_normal(2)
         step = 1e-3 * comparator.least_count_um
         fiducials = turn @ photograph.fiducials.xy + shift[:, None]
-        seen = simulate_pointings(
+        observed = simulate_pointings(
             fiducials, 1e-3 * observer.monocular_um, observer.repeat_share, comparator.pointings, rng
         )
-        read = round_to_count(seen, step).mean(axis=-1)
+        read = round_to_count(observed, step).mean(axis=-1)
         return cls(turn, shift, step, plane_fit(read, calibrated_fiducials(photograph), comparator.fit))
 
     def at(self, film: Array) -> Array:
         """Return positions on the stage of positions ``(2, n)`` on film."""
         return np.asarray(self.turn @ film + self.shift[:, None])
 
-    def read(self, seen: Array) -> Array:
+    def read(self, observed: Array) -> Array:
         """Return the means of readings ``(2, n, pointings)`` in mm of the calibrated system."""
-        return self.fit.calibrated(round_to_count(seen, self.step).mean(axis=-1))
+        return self.fit.calibrated(round_to_count(observed, self.step).mean(axis=-1))
 
 
 def calibrated_fiducials(photograph: Photograph) -> Array:
@@ -187,8 +189,8 @@ def simulate_pointings(
 
 def pointing_errors(shape: tuple[int, ...], share: float, pointings: int, rng: np.random.Generator) -> Array:
     """Return the errors ``(*shape, pointings)`` of `simulate_pointings` in units of their standard deviations."""
-    seen = np.sqrt(1.0 - share**2) * rng.standard_normal(shape)
-    return np.asarray(seen[..., None] + share * rng.standard_normal((*shape, pointings)))
+    observed = np.sqrt(1.0 - share**2) * rng.standard_normal(shape)
+    return np.asarray(observed[..., None] + share * rng.standard_normal((*shape, pointings)))
 
 
 def round_to_count(values: Array, least_count: float) -> Array:
@@ -196,27 +198,27 @@ def round_to_count(values: Array, least_count: float) -> Array:
     return np.asarray(np.round(values / least_count) * least_count) if least_count else values
 
 
-def common_points(left: NamedPoints, right: NamedPoints, wanted: frozenset[str]) -> tuple[str, ...]:
+def common_points(left: NamedPoints, right: NamedPoints, point_names: frozenset[str]) -> tuple[str, ...]:
     """Return the names, in order, of the wanted points in both photographs."""
-    return tuple(sorted(wanted.intersection(left.names) & wanted.intersection(right.names)))
+    return tuple(sorted(point_names.intersection(left.names) & point_names.intersection(right.names)))
 
 
 def mark_coordinates(marks: NamedPoints, names: Sequence[str]) -> Array:
     """Return the positions ``(2, len(names))`` of named marks."""
-    place = {name: i for i, name in enumerate(marks.names)}
-    return marks.xy[:, [place[name] for name in names]]
+    index = {name: i for i, name in enumerate(marks.names)}
+    return marks.xy[:, [index[name] for name in names]]
 
 
 def _stream(seed: int, photograph: int) -> np.random.Generator:
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(COMPARATOR_STREAM, photograph)))
 
 
-def _of_lens(image: Array, scenario: Scenario) -> Array:
+def _correct_lens(image: Array, scenario: Scenario) -> Array:
     camera = scenario.camera
     return corrected_image(image, camera.c, principal_point=camera.principal_point, distortion=camera.distortion)
 
 
-def _of_air(image: Array, scenario: Scenario, flying_height: float, ground_height: float) -> Array:
+def _correct_air(image: Array, scenario: Scenario, flying_height: float, ground_height: float) -> Array:
     camera = scenario.camera
     return corrected_image(
         image,
@@ -230,9 +232,9 @@ def _of_air(image: Array, scenario: Scenario, flying_height: float, ground_heigh
     )
 
 
-def _strip_of(pairs: Sequence[ImagePair], scenario: Scenario, scene: Scene) -> StripResult:
-    c, way = scenario.camera.c, scenario.comparator.orientation
-    return orient_measured_strip(tuple(_computed(pair, c, way) for pair in pairs), scenario, scene)
+def _orient_pairs(pairs: Sequence[ImagePair], scenario: Scenario, scene: Scene) -> StripResult:
+    c, method = scenario.camera.c, scenario.comparator.orientation
+    return orient_measured_strip(tuple(_compute_model(pair, c, method) for pair in pairs), scenario, scene)
 
 
 def orient_measured_strip(models: tuple[Model, ...], scenario: Scenario, scene: Scene) -> StripResult:
@@ -241,10 +243,10 @@ def orient_measured_strip(models: tuple[Model, ...], scenario: Scenario, scene: 
     return StripResult(models, orient_strip(models, ground_control(scenario, scene), plan.join, plan.polynomial))
 
 
-def _computed(pair: ImagePair, c: float, way: str) -> Model:
+def _compute_model(pair: ImagePair, c: float, method: str) -> Model:
     """Return a model computed from its images, at the scale of the photographs, in the left photograph's frame."""
     with errors_for_model(pair.model.name):
-        turn, base = _oriented(pair.left, pair.right, c, way)
+        turn, base = _orient_pair(pair.left, pair.right, c, method)
     base_length = float(length_of((pair.left - pair.right).mean(axis=1)))
     points, _ = model_coordinates(pair.left, pair.right, c, c, turn, base, base_length)
     return add_centres(pair.model, pair.points, points, np.array([np.zeros(3), base_length * base]).T)
@@ -265,10 +267,12 @@ def add_centres(model: ModelPlan, names: Sequence[str], points: Array, centres: 
     return Model(model.name, (*names, *ends), np.concatenate([points, centres], axis=1))
 
 
-def _oriented(left: Array, right: Array, c: float, way: str) -> tuple[Array, Array]:
+def _orient_pair(left: Array, right: Array, c: float, method: str) -> tuple[Array, Array]:
     """Return the rotation ``(3, 3)`` of the right photograph into the left one's frame, and the unit base there."""
-    if way == "parallax":
-        stand = clear_parallaxes(left, right, (c, c), bx=1.0)
-        return stand.rotation, stand.base
-    found = orientation_by_schut(left, right, c, c) if way == "schut" else relative_orientation(left, right, c, c)
-    return found.rotation, found.base
+    if method == "parallax":
+        cleared = clear_parallaxes(left, right, (c, c), bx=1.0)
+        return cleared.rotation, cleared.base
+    orientation = (
+        orientation_by_schut(left, right, c, c) if method == "schut" else relative_orientation(left, right, c, c)
+    )
+    return orientation.rotation, orientation.base

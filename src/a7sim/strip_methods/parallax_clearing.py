@@ -48,15 +48,16 @@ class ClearedPair:
         return ClearedPair(c, (self.angles[0][:, model], self.angles[1][:, model]), self.bx, self.rounds)
 
     def model_points(self, left: Array, right: Array) -> tuple[Array, Array]:
-        """Return the points of zero x-parallax ``(3, n, ...)``, from the left centre, and y-parallaxes ``(n, ...)``,
-        mm.
+        """Return the points of zero x-parallax ``(3, n, ...)`` and the y-parallaxes ``(n, ...)``, mm.
+
+        Points are relative to the left centre.
         """
         rays = [
-            ray_of(image, turned[:, :, None], c)
-            for image, turned, c in zip((left, right), self.rotations, self.c, strict=True)
+            ray_of(image, camera[:, :, None], c)
+            for image, camera, c in zip((left, right), self.rotations, self.c, strict=True)
         ]
-        alike = (3, *(1,) * (left.ndim - 1))
-        centre1, centre2 = np.zeros(alike), np.array([self.bx, 0.0, 0.0]).reshape(alike)
+        shape = (3, *(1,) * (left.ndim - 1))
+        centre1, centre2 = np.zeros(shape), np.array([self.bx, 0.0, 0.0]).reshape(shape)
         return stereoscopic_intersection(centre1, rays[0], centre2, rays[1])
 
 
@@ -74,22 +75,24 @@ def clear_parallaxes(
         raise Undetermined(f"expected at least {len(UNKNOWNS)} points to orient a model, got {left.shape[1]}")
     dx, dy = (left - right).mean(axis=1)
     swing = -np.arctan2(dy, dx)
-    still = np.zeros_like(swing)
-    level = np.array([still, still, swing])
-    stand = ClearedPair(c, (level, level), bx, 0)
+    zero = np.zeros_like(swing)
+    level = np.array([zero, zero, swing])
+    cleared = ClearedPair(c, (level, level), bx, 0)
     clearing = np.ones(swing.shape, dtype=bool)
     for i in range(1, MAX_ROUNDS + 1):
-        points, parallaxes = stand.model_points(left, right)
+        points, parallaxes = cleared.model_points(left, right)
         enlargement = -points[2] / c[0]
-        one, two = (
-            ProjectorPose(np.array([still + x, still, still]), angles)
-            for x, angles in zip((0.0, bx), stand.angles, strict=True)
+        left_pose, right_pose = (
+            ProjectorPose(np.array([zero + x, zero, zero]), angles)
+            for x, angles in zip((0.0, bx), cleared.angles, strict=True)
         )
-        step = element_corrections(parallaxes + enlargement * errors_mm, points, one, two, UNKNOWNS).unknowns
+        step = element_corrections(
+            parallaxes + enlargement * errors_mm, points, left_pose, right_pose, UNKNOWNS
+        ).unknowns
         kappa1, kappa2, phi1, phi2, omega2 = np.where(clearing, step, 0.0)
-        turns = np.array([still, phi1, kappa1]), np.array([omega2, phi2, kappa2])
-        stand = ClearedPair(c, (stand.angles[0] + turns[0], stand.angles[1] + turns[1]), bx, i)
+        turns = np.array([zero, phi1, kappa1]), np.array([omega2, phi2, kappa2])
+        cleared = ClearedPair(c, (cleared.angles[0] + turns[0], cleared.angles[1] + turns[1]), bx, i)
         clearing = clearing & ~(np.abs(step).max(axis=0) < CONVERGED_MM)
         if not clearing.any():
-            return stand
+            return cleared
     raise Undetermined(f"the y-parallaxes of {left.shape[1]} points are not cleared in {MAX_ROUNDS} rounds")

@@ -103,11 +103,11 @@ def models_from_documents(documents: Sequence[Document]) -> list[Model]:
 
 
 def _model(document: Document) -> Model:
-    plane, height = document["xy_units_per_mm"], document["z_units_per_mm"]
+    xy_units, height = document["xy_units_per_mm"], document["z_units_per_mm"]
     places = {point: (each["X"], each["Y"], each["Z"]) for point, each in document["points"].items()}
     for side, centre in document["perspective_centres"].items():
         places[f"{document[side]}:centre"] = (centre["X0"], centre["Y0"], centre["Z0"])
-    coordinates = np.array(list(places.values())).T / [[plane], [plane], [height]]
+    coordinates = np.array(list(places.values())).T / [[xy_units], [xy_units], [height]]
     return Model(document["model"], tuple(places), coordinates)
 
 
@@ -121,15 +121,19 @@ def strip_cards(strip: OrientedStrip, models: Sequence[Model], ground: Ground) -
     numbered_ground = Ground(tuple(key[name] for name in ground.points), ground.coordinates, ground.roles)
     on_ground = strip.on_ground
     numbered_strip = Strip(tuple(_numbered(model, key) for model in on_ground.models), on_ground.joins)
-    deck = _fitting(lambda decimals: deck_lines(numbered_ground, [_numbered(model, key) for model in models], decimals))
-    return StripCards(deck, _fitting(lambda decimals: output_lines(numbered_ground, numbered_strip, decimals)), key)
+    deck = _fit_to_columns(
+        lambda decimals: deck_lines(numbered_ground, [_numbered(model, key) for model in models], decimals)
+    )
+    return StripCards(
+        deck, _fit_to_columns(lambda decimals: output_lines(numbered_ground, numbered_strip, decimals)), key
+    )
 
 
 def card_numbers(names: Iterable[str]) -> dict[str, str]:
     """Return the names of points for cards; `<photo>:centre` keeps its photograph."""
     unique = dict.fromkeys(names)
-    taken = {name.removesuffix(CENTRE) for name in unique}
-    free = (str(number) for number in range(FIRST_FREE_NUMBER, 100_000) if str(number) not in taken)
+    used = {name.removesuffix(CENTRE) for name in unique}
+    free = (str(number) for number in range(FIRST_FREE_NUMBER, 100_000) if str(number) not in used)
     return {name: name if _is_card_number(name) else next(free) + CENTRE * is_centre(name) for name in unique}
 
 
@@ -142,7 +146,7 @@ def _numbered(model: Model, key: Mapping[str, str]) -> Model:
     return Model(model.name, tuple(key[name] for name in model.points), model.coordinates)
 
 
-def _fitting(lines_of: Callable[[int], list[str]]) -> list[str]:
+def _fit_to_columns(lines_of: Callable[[int], list[str]]) -> list[str]:
     """Return cards with as many decimals as nine columns allow, three at most."""
     for decimals in (3, 2):
         try:
