@@ -6,6 +6,7 @@ import re
 import tokenize
 from collections import defaultdict
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,7 @@ def allowed() -> dict[tuple[str, str], str]:
     return {(path, phrase): reason for path, phrase, reason in rows}
 
 
+@cache
 def phrases_by_file() -> dict[str, list[tuple[int, str]]]:
     found = {_relative(file): forbidden_phrases(prose_of_python(file.read_text("utf-8"))) for file in python_files()}
     found |= {_relative(page): forbidden_phrases(prose_of_page(page.read_text("utf-8"))) for page in pages()}
