@@ -58,22 +58,22 @@ _NEAR_ENOUGH_MM = 0.15
 
 _MAX_CORRECTION_MM = 3.0
 _SAME_LINE_MM, _JOINED_MM, _STUB_MM = 2.5, 1.5, 10.0
-"""Distance from a drawn line within which no line starts, and at which a line ends, as at a saddle of its own height;
+"""Distance from a drawn line within which no line starts; distance at which a line ends; and length of a stub.
 
-a shorter piece that ends so is not a line of its own.
+A line ends near another one at a saddle of its own height. A piece shorter than a stub that ends so is no line.
 """
 
 _AT_A_GLANCE = 10.0
-"""Height, by size of a picture element, up to which the eyes fuse without a search;
+"""Height, in picture elements, up to which the eyes fuse without a search.
 
-beyond, unrelated images might be fused.
+Beyond it, unrelated images might be fused.
 """
 
 _CLOSELY = ((FINE_MM, 0.0), (MIDDLING_MM, 0.0), (MIDDLING_MM, 3.0), (COARSE_MM, 12.0))
 _WIDELY = _CLOSELY[2:]
-"""Sizes of picture elements and heights that are searched, from the finest outward;
+"""Sizes of picture elements and searched heights, in mm, in the order of the search.
 
-a medium one is as good as a fine one if a signal disturbs that.
+A medium element serves as well as a fine one if a signal disturbs the fine image.
 """
 
 ROAD_MM = 0.08

@@ -13,7 +13,9 @@ from a7sim.geometry import Array, length_of
 from a7sim.scenario import Observer
 
 TREMOR_SHARE = 2.0
-"""Ratio of the tremor of a moving hand to the error of a stereoscopic pointing at rest [assumption; no source at hand].
+"""Ratio of the tremor of a moving hand to the error of a stereoscopic pointing at rest.
+
+[assumption; no source at hand]
 """
 
 CONTOUR = "contour"
@@ -46,7 +48,9 @@ class LineTarget:
 
 
 Ending = Literal["closed", "edge", "end", "joined", "lost"]
-"""Ending of a line: at its own start, the edge of the area, the end on the old map, another line, or where it is lost.
+"""Ending of a line.
+
+In this order: its own start, the edge of the area, the end on the old map, another line, or where it is lost.
 """
 
 

@@ -22,9 +22,9 @@ FINE_MM, MIDDLING_MM, COARSE_MM = 0.03, 0.07, 0.2
 """Size of a picture element at photo scale; the finest image shows 1.44 mm of the photograph."""
 
 FUSED = 0.95
-"""Correlation above which two images count as the same ground:
+"""Correlation from which two images count as the same ground.
 
-on bare ground 0.97 and more, elsewhere less (docs/compilation.md).
+It is 0.97 and more on bare ground, and less elsewhere (docs/compilation.md).
 """
 
 _PATCH = 31
@@ -94,8 +94,9 @@ class StereoPatch:
         return np.array(np.meshgrid(at, at)).reshape(2, -1)
 
     def elements_at(self, seen: Array) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
-        """Return columns and rows ``(..., n)`` of positions ``(..., 2, n)``, and which are visible and not covered by
-        the mark.
+        """Return columns and rows ``(..., n)`` of positions ``(..., 2, n)``, and which are usable.
+
+        A position is usable if the image shows it and the mark does not cover it.
         """
         columns = seen[..., 0, :] / self.pitch + (SIDE - 1) / 2.0
         rows = -seen[..., 1, :] / self.pitch + (SIDE - 1) / 2.0
@@ -153,7 +154,7 @@ class StereoView:
         return np.array(seen)
 
     def look(self, pitch: float = FINE_MM) -> StereoPatch:
-        """Look with both eyes;
+        """Look with both eyes and return the images.
 
         `pitch` is the size of a picture element in mm of the photographs. The caller adds the time.
         """
@@ -216,10 +217,10 @@ def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
 
 
 def _compared(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """Return the greys ``(n,)`` of a surface in both images, their gradients ``(2, n)`` per mm and the positions ``(2,
-    n)``.
+    """Return the greys of a surface in both images, their gradients, and the positions.
 
-    Positions covered by the mark or outside either image are left out.
+    Greys ``(n,)``, gradients per mm ``(2, n)``, positions ``(2, n)``. Positions covered by the mark or outside either
+    image are left out.
     """
     between, plan = _seen_by_both(look, surface)
     sense = np.array([[1.0], [-1.0]])
@@ -238,9 +239,9 @@ def _seen_by_both(look: StereoPatch, surface: Array) -> tuple[list["_Between"], 
 
 @dataclass(frozen=True)
 class _Between:
-    """Positions ``(n,)`` between picture elements:
+    """Positions ``(n,)`` between picture elements.
 
-    fractions to the right and down, and the differences of grey about them.
+    Fractions to the right and down, and the greys about them with their differences.
     """
 
     to_right: Array
@@ -282,12 +283,10 @@ def _correlation(look: StereoPatch, surface: Array) -> float:
 
 
 def rectify(look: StereoPatch, surface: PerceivedSurface, side: int) -> tuple[npt.NDArray[np.bool_], Array, Array]:
-    """Return the view of the left eye projected onto the ground:
+    """Return the view of the left eye projected onto the ground.
 
-    visibility, greys, both ``(n,)``, and positions ``(2, n)``.
-
-    The patch has `side` picture elements in each direction; positions are displacements from the mark in plan, mm in
-    the model.
+    The result is the visibility and the greys, both ``(n,)``, and the positions ``(2, n)``. The patch has `side`
+    picture elements in each direction; positions are displacements from the mark in plan, mm in the model.
     """
     plan = look.patch(side)
     seen = look.shown[0] @ np.concatenate([plan, [surface.height + surface.slope @ plan]])

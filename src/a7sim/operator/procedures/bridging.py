@@ -144,10 +144,10 @@ def _see_that_it_follows(workstation: Workstation, last: ModelJob, model: ModelJ
 
 
 def extend_strip(workstation: Workstation, model: ModelJob) -> None:
-    """Preset X for the new position of the oriented photograph on the left, and Y and Z where its by and bz reach a
-    limit.
+    """Preset the counters for the new position of the oriented photograph on the left.
 
-    With the base changed over, its centre moves from X = bx to X = 0: the reading at X = 0 must increase by bx.
+    With the base changed over, its centre moves from X = bx to X = 0: the reading at X = 0 must increase by bx. Y and Z
+    are preset where its by or bz is farther than `SHARE_OF_RANGE` from zero.
     """
     controls, active, n = workstation.controls, workstation.operators.active, model.left_projector
     controls.shift_counter(active, "X", controls.elements(active, ["bx"])["bx"])

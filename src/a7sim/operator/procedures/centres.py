@@ -313,11 +313,10 @@ def _resected(
 def _in_counter_units(
     found: Resection, levels: Levels, units: float, c: Array, lie: PlatePlacement
 ) -> PerspectiveCentre:
-    """Return a resected centre in the form of a centre by levels:
+    """Return a resected centre in the form of a centre by levels.
 
-    residuals in X and Y at the mean level, T0 from first to last.
-
-    The precision of the plate's placement enters the standard deviations of X0 and Y0.
+    The residuals in X and Y are those at the mean level; T0 is from the first level to the last. The precision of the
+    plate's placement enters the standard deviations of X0 and Y0.
     """
     x, y, z = found.centre
     sigma_x, sigma_y, sigma_z = found.sigma_centre

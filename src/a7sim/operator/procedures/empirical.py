@@ -81,12 +81,12 @@ def over_correction_by_coefficients(coefficients: Array) -> Array:
 
 
 def clearing_coefficients(points: Array, left: ProjectorPose, right: ProjectorPose) -> Array:
-    """Return the coefficients of the ten elements in the y-parallax at points ``(3, n, m)``, in the order of
-    PARALLAX_ELEMENTS.
+    """Return the coefficients ``(10, n, m)`` of the elements in the y-parallax at points ``(3, n, m)``.
 
-    mm per radian or mm per mm, for any tilt, of the parallax that is visible when the mark has followed in height: T
-    2.32 minus the share of the x-parallax where the base is inclined. The parallax is ``b . (r1 x r2) / (x1 z2 - z1
-    x2)`` with the rays r1 and r2 to the point.
+    The elements are in the order of PARALLAX_ELEMENTS. The coefficients, in mm per radian or mm per mm, are valid for
+    any tilt. They are those of the parallax that is visible when the mark has followed in height: T 2.32 minus the
+    share of the x-parallax where the base is inclined. The parallax is ``b . (r1 x r2) / (x1 z2 - z1 x2)`` with the
+    rays r1 and r2 to the point.
     """
     r1, r2 = points - left.centre[:, None], points - right.centre[:, None]
     base = np.broadcast_to((right.centre - left.centre)[:, None], points.shape)

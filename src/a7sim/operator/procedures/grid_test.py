@@ -22,9 +22,9 @@ from a7sim.reduction import Elements, PlatePlacement, ProjectorTest, grid_test
 from a7sim.scenario import Camera, GridPlate, Plan
 
 TIMES_REGISTERED = 4
-"""Registrations of each fiducial of the plate before the pointings:
+"""Number of registrations of each fiducial of the plate before the pointings.
 
-they limit the precision of principal point and swing.
+It limits the precision of principal point and swing.
 """
 
 MARGIN_MM = 5.0
@@ -69,9 +69,10 @@ class GridTestPlan:
 
 
 def level_heights(manual: Variant, c: float, outermost: float, levels: int) -> list[float]:
-    """Return levels of Z in mm of the frame at which crosses of this distance from the middle can be reached;
+    """Return levels of Z, mm of the frame, at which the mark reaches all crosses.
 
-    one is the middle.
+    `outermost` is the largest coordinate of a cross from the middle of the plate, mm. A single level is the mean of the
+    nearest and the farthest.
     """
     reach = min(abs(end) for axis in "XY" for end in manual.carriages[axis]) - MARGIN_MM
     lowest, highest = manual.carriages["Z"]

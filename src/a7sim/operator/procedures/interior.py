@@ -137,9 +137,9 @@ def view_fiducials(workstation: Workstation, active: Indices, projector: int) ->
 def _rightly_laid(
     workstation: Workstation, active: Indices, projector: int, photograph: str, displacements: Array, places: Array
 ) -> npt.NDArray[np.bool_]:
-    """Return which sessions have their fiducials near the collimating marks of their names ``(m,)``;
+    """Return in which sessions the fiducials are near the collimating marks of their names ``(m,)``.
 
-    the others give up.
+    The other sessions give up.
     """
     furthest = np.abs(displacements).max(axis=(0, 1))
     upside_down = np.abs(displacements + 2.0 * places[:, :, None]).max(axis=(0, 1)) < MISPLACED_MM

@@ -16,7 +16,9 @@ Crosses = Mapping[str, tuple[float, float]]
 """Names and nominal positions in mm."""
 
 MAX_SLIP_SIGMAS = 4.5
-"""A cross farther than this from the position given by the others is measured again; 1 of 3000 good ones among 25 is.
+"""Distance from the position given by the other crosses beyond which a cross is measured again, in standard deviations.
+
+Of 3000 good crosses on plates of 25, one is measured again.
 """
 
 MIN_SLIP_MM = 0.01
@@ -86,9 +88,9 @@ def _go_below(workstation: Workstation, active: Indices, side: int) -> None:
 
 
 def _misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:
-    """Return the index ``(m,)`` of the cross that contradicts the others, -1 for none;
+    """Return the index ``(m,)`` of the cross that contradicts the others, -1 for none.
 
-    a tilted plane is seen in perspective.
+    The plate is fitted by a projective plane, because a tilted plane is seen in perspective.
     """
     fit = plane_fit(readings, crosses, "projective")
     controlled = fit.adjustment.redundancy_numbers.reshape(fit.residuals.shape)

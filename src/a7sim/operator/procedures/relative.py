@@ -30,7 +30,9 @@ GROSS_MM = 0.5
 """While the rms is above this the mean is kept: it is due to the swings and omega, which are still unknown."""
 
 OFF_PATTERN = 0.08
-"""Tolerated deviation of points from the regular pattern, as a share of the height; the next round corrects its effect.
+"""Tolerated deviation of points from the regular pattern, as a share of the height.
+
+The next round corrects its effect.
 """
 
 ALL_ELEMENTS = (*(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)), "bx")
