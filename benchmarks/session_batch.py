@@ -38,7 +38,7 @@ def main():
         records = list(batch.measure_models())
         worked = time.process_time()
         drawing = cpu_seconds_to_draw(calls) * sessions / RECORDED
-        same = all(one.points == many.of(0).points for one, many in zip(alone, records, strict=True))
+        same = all(one.points == many.for_session(0).points for one, many in zip(alone, records, strict=True))
         took = worked - began
         print(
             f"{sessions:8}  {opened - began:6.2f}  {took:6.2f}  {1e3 * took / sessions:12.1f}  {drawing:9.3f}  "

@@ -42,7 +42,7 @@ class Worker:
         person = self.session.person
         person.book.set_heading("", "preparation")
         self.workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job)
-        self.record = next(measure_models_batch(self.workstation)).of(0)
+        self.record = next(measure_models_batch(self.workstation)).for_session(0)
         self.view = StereoView(self.workstation, person)
         control = ground_control(scenario, self.session.scene)
         self.model = level_model(self.workstation, self.view, self.record.points, control, SCALE)

@@ -79,7 +79,7 @@ def made_ready(crew, hands, job):
 def orient(scenario, seed, model=0, change=lambda job: job):
     """The relative orientation of one model of a scenario, and the book."""
     session, bench = ready(scenario, seed, model, change)
-    return orient_model(bench, bench.job.models[0]).of(0), session.person.book
+    return orient_model(bench, bench.job.models[0]).for_session(0), session.person.book
 
 
 def akwanga(method="independent", **overrides):
@@ -155,7 +155,7 @@ def _cleared(seeds, method, **overrides):
             made_ready(batch.workstation.operators, batch.workstation.driver, job), job.models[0]
         )
         assert batch.workstation.operators.reasons == {}
-        found |= {seed: orientations.of(session) for session, seed in enumerate(batch.seeds)}
+        found |= {seed: orientations.for_session(session) for session, seed in enumerate(batch.seeds)}
     in_order = [found[seed] for seed in seeds]
     return np.array([(len(f.rounds), f.rms, len(f.residuals), abs(f.rounds[0].parallaxes["6"])) for f in in_order])
 
@@ -343,7 +343,7 @@ def test_a_point_whose_images_do_not_come_together_is_done_without(monkeypatch):
     monkeypatch.setattr(
         bench.mark, "fuse", lambda active, point, judged: active[:0] if point == "1025" else fuse(active, point, judged)
     )
-    found = orient_model(bench, bench.job.models[0]).of(0)
+    found = orient_model(bench, bench.job.models[0]).for_session(0)
     assert set(found.rounds[-1].parallaxes) == set("12345")
     assert "6" not in found.residuals
     assert any("images of 1025 cannot be fused: done without" in remark for remark in session.person.book.remarks)

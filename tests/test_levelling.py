@@ -30,7 +30,7 @@ def scenario_of(**overrides):
 def levelled(scenario, seed=1):
     batch = open_batch(scenario, [seed])
     (record,) = batch.measure_models()
-    return batch, record.of(0)
+    return batch, record.for_session(0)
 
 
 @pytest.fixture(scope="module")

@@ -127,7 +127,7 @@ def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
     for i, seed in enumerate(seeds):
         session = open_session(scenario, seed)
         record = next(iter(measure_models(session.person, session.job)))
-        assert record.orientation.elements == records.of(i).orientation.elements
+        assert record.orientation.elements == records.for_session(i).orientation.elements
         assert [_told(slip) for slip in session.person.slips] == [
             _told(slip) for slip in batch.workstation.operators.slip_log[i]
         ]

@@ -48,7 +48,7 @@ def _same(crowd, records, session, seed):
             done.append(record)
     except OperatorGaveUp as error:
         why = str(error)
-    among_others = [each.of(session) for each in records if session in each.sessions]
+    among_others = [each.for_session(session) for each in records if session in each.sessions]
     return (
         crowd.workstation.operators.reasons.get(session) == why
         and [read_and_set(each) for each in done] == [read_and_set(each) for each in among_others]

@@ -248,7 +248,7 @@ def test_on_water_no_spot_is_set_and_no_contour_followed():
     workstation = Workstation(
         OperatorBatch.single(person), ScpiDriver(person), replace(session.job, models=session.job.models[:1])
     )
-    record = next(measure_models_batch(workstation)).of(0)
+    record = next(measure_models_batch(workstation)).for_session(0)
     view = StereoView(workstation, person)
     model = level_model(workstation, view, record.points, ground_control(scenario, session.scene), 3750.0)
     ground = session.scene.ground

@@ -43,7 +43,7 @@ def seen_at_six(n_and_seed):
     workstation = Workstation(OperatorBatch.single(session.person), ScpiDriver(session.person), session.job)
     with suppress(_IsReady):
         next(measure_models_batch(workstation, _stop))
-    found = orient_model(workstation, session.job.models[0]).of(0)
+    found = orient_model(workstation, session.job.models[0]).for_session(0)
     _, y, z = found.places["6"]
     return [abs(each.parallaxes["6"]) for each in found.rounds], float(over_correction(z, abs(y)))
 

@@ -164,7 +164,7 @@ def _ground_document(strip: Model, ground: Ground, scenario: Scenario) -> Docume
 
 
 def _model_document(bridged: BridgedModels) -> Document:
-    orientation = bridged.orientation.of(0)
+    orientation = bridged.orientation.for_session(0)
     mm = [1.0, 1.0, 1.0 / bridged.z_units_per_mm]
     common = {name: [round(float(v), 4) for v in each[:, 0] * mm] for name, each in bridged.common.items()}
     return {

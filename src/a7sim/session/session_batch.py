@@ -53,7 +53,9 @@ class SessionBatch:
             planned_model = next(model for model in self.scenario.models if model.name == records.model.name)
             comparison = self._compare_with_truth(records, self.scenes[0].relative_truth(planned_model))
             for member, session in enumerate(records.sessions.tolist()):
-                models[session].append(ModelResult(records.of(session), comparison, member, planned_model.published))
+                models[session].append(
+                    ModelResult(records.for_session(session), comparison, member, planned_model.published)
+                )
         return [self._result(session, models[session], strips) for session in range(len(self.seeds))]
 
     def _compare_with_truth(self, records: ModelRecordBatch, truth: RelativeTruth | None) -> TruthComparison:

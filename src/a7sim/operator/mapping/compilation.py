@@ -7,7 +7,7 @@ eyepieces and therefore runs over a link only. Lengths are mm at model scale unl
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -95,6 +95,9 @@ class _Vertex:
     place: Array
     heading: Array
     surface: PerceivedSurface
+    look: StereoPatch
+    correction: Array
+    """From the mark to the intended position, as seen in the look ``(2,)``."""
 
 
 class Compilation:
@@ -206,7 +209,7 @@ class Compilation:
             middle = np.array([*guess, spots.nearest(guess)])
             z = float(self.model.readings_of(_at_height(self.model.on_ground(middle), height))[2])
             self._drive(guess, z)
-            start = self._on_contour(guess, None, name)
+            start = self._find_contour(guess, None)
             if start is None or any(distance_to(line.readings[:2], start.place) < _SAME_LINE_MM for line in lines):
                 continue
             found = self._both_ways(name, height, start, z, lines)
@@ -224,7 +227,7 @@ class Compilation:
         if ending == "closed":
             return TracedLine(name, CONTOUR, height, as_polyline([*outward, outward[0]]), ("closed", "closed"))
         self._drive(start.place, z)
-        back, other = self._followed(name, _Vertex(start.place, -start.heading, start.surface), drawn)
+        back, other = self._followed(name, replace(start, heading=-start.heading), drawn)
         return TracedLine(name, CONTOUR, height, as_polyline([*back[::-1], *outward]), (other, ending))
 
     def _followed(self, name: str, start: _Vertex, drawn: Sequence[TracedLine]) -> tuple[list[Array], Ending]:
@@ -237,7 +240,7 @@ class Compilation:
             if length_of(cut) < 1e-2:
                 return vertices, "edge"
             self._turn(at.place + cut - self._place())
-            following = self._on_contour(self._place(), at, name, vertices)
+            following = self._find_contour(self._place(), at)
             if following is None:
                 if step <= MIN_STEP_MM:
                     return vertices, "lost"
@@ -245,6 +248,7 @@ class Compilation:
                 step = max(step / 2.0, MIN_STEP_MM)
                 bend = 0.0
                 continue
+            vertices.append(self._register_vertex(following, name))
             bend = _angle(at.heading, following.heading)
             at = following
             if any(distance_to(line.readings[:2], at.place) < _JOINED_MM for line in drawn):
@@ -258,14 +262,8 @@ class Compilation:
                 return vertices, "closed"
         return vertices, "lost"
 
-    def _on_contour(
-        self,
-        place: Array,
-        before: _Vertex | None,
-        name: str,
-        into: list[Array] | None = None,
-    ) -> _Vertex | None:
-        """Move the mark onto the contour at its height; with `into`, register it there with the tremor of the hand."""
+    def _find_contour(self, place: Array, before: _Vertex | None) -> _Vertex | None:
+        """Move the mark near the contour at its height; return the vertex there, None if none is found."""
         expected = None if before is None else PerceivedSurface(0.0, before.surface.slope, 0.0, 1.0)
         for number in range(_MAX_LOOKS):
             seen = self._seen(expected, _CLOSELY if number or before is not None else _WIDELY)
@@ -287,14 +285,17 @@ class Compilation:
                 strike = -strike
             if before is not None and _strayed(before, place, here, strike):
                 return None
-            if into is not None:
-                (along, across), error = self._tremor(look)
-                up = surface.slope / np.sqrt(steepness)
-                misjudged = np.clip(error / np.sqrt(steepness), -_MAX_CORRECTION_MM, _MAX_CORRECTION_MM)
-                self._turn(back + along * strike + (across + misjudged) * up)
-                into.append(self._registered(name))
-            return _Vertex(here, strike, surface)
+            return _Vertex(here, strike, surface, look, back)
         return None
+
+    def _register_vertex(self, vertex: _Vertex, name: str) -> Array:
+        """Move the mark to a vertex with the tremor of the hand; return the registered readings ``(3,)``."""
+        (along, across), error = self._tremor(vertex.look)
+        slope = vertex.surface.slope
+        steepness = np.sqrt(float(slope @ slope))
+        misjudged = np.clip(error / steepness, -_MAX_CORRECTION_MM, _MAX_CORRECTION_MM)
+        self._turn(vertex.correction + along * vertex.heading + (across + misjudged) * (slope / steepness))
+        return self._registered(name)
 
     # --- lines ----------------------------------------------------------------------------------------
 

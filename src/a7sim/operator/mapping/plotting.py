@@ -92,7 +92,7 @@ def compile_map(
     """
     person.book.set_heading("", "preparation")
     workstation = Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick)
-    record = next(measure_models_batch(workstation, begins)).of(0)
+    record = next(measure_models_batch(workstation, begins)).for_session(0)
     view = StereoView(workstation, person)
     begin_form(workstation, workstation.controls.model, "absolute orientation", begins)
     gear = TABLE_GEARS[job.plan.plan_gear]

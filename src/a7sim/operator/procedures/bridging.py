@@ -17,7 +17,6 @@ from a7sim.operator.driving.scpi_driver import ScpiDriver
 from a7sim.operator.driving.workstation import Workstation
 from a7sim.operator.people.operator_batch import AllGaveUpError, OperatorBatch
 from a7sim.operator.people.person import Person
-from a7sim.operator.procedures.interior import InteriorOrientationBatch
 from a7sim.operator.procedures.models import (
     begin_form,
     load_prints,
@@ -95,7 +94,6 @@ def bridge_strip_batch(
 
 def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
     operators, controls, job = workstation.operators, workstation.controls, workstation.job
-    interior: dict[str, InteriorOrientationBatch] = {}
     controls.prepare(operators.active)
     before: dict[str, Array] = {}
     last: ModelJob | None = None
@@ -105,7 +103,7 @@ def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterato
             _see_that_it_follows(workstation, last, model)
             extend_strip(workstation, model)
         set_base_and_fittings(workstation, model.base, model.polarity)
-        mount_photographs(workstation, model, interior)
+        mount_photographs(workstation, model)
         prints = load_prints(workstation, model)
         require_active(workstation)
         workstation.begin(operators.active, model, prints)

@@ -243,6 +243,16 @@ def _too_few(model: ModelJob, missing: frozenset[str]) -> str:
     )
 
 
+@dataclass(frozen=True)
+class _ClearingTurn:
+    """Turn of an element that cleared a point."""
+
+    sessions: Indices
+    """Sessions in which the point was cleared."""
+    element_change: Array
+    """Change of the element ``(sessions,)``, gon or mm; zero where the point was clear or was not cleared."""
+
+
 class _Clearing:
     """Rounds of the sessions that use the same elements at the same points."""
 
@@ -313,7 +323,7 @@ class _Clearing:
         for _ in range(MAX_PASSES):
             again = clearing[:0]
             for place, step in enumerate(self.steps[:4]):
-                cleared = self._clear(self._going(clearing), place, step)
+                cleared = self._clear(self._going(clearing), place, step).sessions
                 seen = np.abs(self._found[step.position][cleared])
                 again = np.union1d(again, cleared[seen > VISIBLE_SIGMAS * self._visible])
             clearing = self._going(again)
@@ -324,8 +334,9 @@ class _Clearing:
     def _over_correct(self, active: Indices) -> tuple[Indices, Indices, Array]:
         """Turn omega by n times the clearing turn; return the sessions at the point, those that turned, and n."""
         controls, step, threshold = self.workstation.controls, self.steps[-1], VISIBLE_SIGMAS_AT_LAST * self._visible
-        turn, n = np.zeros((2, self.operators.size))
-        active = self._clear(active, len(self.steps) - 1, step, threshold, turn)
+        n = np.zeros(self.operators.size)
+        cleared = self._clear(active, len(self.steps) - 1, step, threshold)
+        active, turn = cleared.sessions, cleared.element_change
         turning = active[turn[active] != 0.0]
         if turning.size:
             n[turning] = self._times(turning)
@@ -360,18 +371,14 @@ class _Clearing:
         squares = np.square(list(parallaxes.values()))
         rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0)))
         nothing = np.zeros(self.operators.size)
-        self.rounds.append(RoundBatch(active, settings, parallaxes, nothing, rms, turning, {}, n))
+        self.rounds.append(RoundBatch(settings, parallaxes, nothing, rms, {}, n, active, turning))
 
     # --- a point --------------------------------------------------------------------------------------
 
-    def _clear(
-        self, active: Indices, place: int, step: ClearingStep, unless_within: float = 0.0, turn: Array | None = None
-    ) -> Indices:
-        """Clear a point, fusing its images first if they are too far apart; return the sessions that succeeded.
-
-        The clearing turns are written into `turn`.
-        """
+    def _clear(self, active: Indices, place: int, step: ClearingStep, unless_within: float = 0.0) -> "_ClearingTurn":
+        """Clear a point, fusing its images first if they are too far apart."""
         point, cleared, parted = self.model.standard_points[step.position], active[:0], active[:0]
+        turn = np.zeros(self.operators.size)
         for tries_left in reversed(range(TRIES)):
             if not active.size:
                 break
@@ -380,8 +387,7 @@ class _Clearing:
             )
             self._found[step.position][done.sessions] = done.arrival_parallax_mm[done.sessions]
             self._places[:, place, done.sessions] = done.model_position_mm[:, done.sessions]
-            if turn is not None:
-                turn[done.sessions] = done.element_change[done.sessions]
+            turn[done.sessions] = done.element_change[done.sessions]
             cleared = np.union1d(cleared, done.sessions)
             active = exclude(self.operators.remaining(active), done.sessions)
             parted = exclude(active, done.disagreement)
@@ -397,7 +403,7 @@ class _Clearing:
         if active.size:
             self.operators.remark(active, f"{self.model.name}: the images of {point} cannot be fused: done without it")
             self.lost.append((active, step.position))
-        return self.operators.remaining(np.asarray(cleared, dtype=np.intp))
+        return _ClearingTurn(self.operators.remaining(np.asarray(cleared, dtype=np.intp)), turn)
 
     def _bring_together(self, one: Indices, point: str, step: ClearingStep) -> None:
         """Turn an element by the difference of the Y readings of both eyes."""

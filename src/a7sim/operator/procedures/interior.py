@@ -1,6 +1,6 @@
 """Interior orientation: fiducials to their collimating marks, principal distance to the counter (thesis 3.4.1)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ class InteriorOrientationBatch:
     film_scale: Array
     principal_distance: Array
 
-    def of(self, session: int) -> InteriorOrientation:
+    def for_session(self, session: int) -> InteriorOrientation:
         """Return the interior orientation of one session."""
         return InteriorOrientation(
             self.photograph,
@@ -62,10 +62,7 @@ def interior_orientation(
     Sessions that cannot centre the picture give up.
     """
     found = centre_picture(workstation, active, projector, photograph, certificate)
-    _set_principal_distance(
-        workstation, workstation.operators.remaining(active), projector, photograph, certificate, found
-    )
-    return found
+    return _set_principal_distance(workstation, workstation.operators.remaining(active), projector, certificate, found)
 
 
 def centre_picture(
@@ -164,13 +161,15 @@ def _set_principal_distance(
     workstation: Workstation,
     active: Indices,
     projector: int,
-    photograph: str,
     certificate: Camera,
     found: InteriorOrientationBatch,
-) -> None:
+) -> InteriorOrientationBatch:
+    """Set the principal distance at the film scale found; return the orientation with it."""
     c = np.round(certificate.c * (1.0 + found.film_scale[active]), 2)
-    found.principal_distance[active] = c
     workstation.controls.spend_setting(active)
     workstation.driver.set_element(active, f"c{projector}", c)
     workstation.controls.give_up_on_errors(active, f"setting c{projector}")
-    workstation.operators.enter(active, "", f"{photograph} centred, c{projector}", c)
+    workstation.operators.enter(active, "", f"{found.photograph} centred, c{projector}", c)
+    principal_distance = np.zeros(workstation.operators.size)
+    principal_distance[active] = c
+    return replace(found, principal_distance=principal_distance)

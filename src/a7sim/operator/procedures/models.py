@@ -65,13 +65,13 @@ class ModelRecordBatch:
     def _points_listed(self) -> dict[str, list[list[float]]]:
         return {point: each.T.tolist() for point, each in self.points.items()}
 
-    def of(self, session: int) -> ModelRecord:
+    def for_session(self, session: int) -> ModelRecord:
         """Return the record of one session."""
         places = {point: each[session] for point, each in self._points_listed.items()}
         return ModelRecord(
             self.model,
-            {name: each.of(session) for name, each in self.interior.items()},
-            self.orientation.of(session),
+            {name: each.for_session(session) for name, each in self.interior.items()},
+            self.orientation.for_session(session),
             {point: (x, y, z) for point, (x, y, z) in places.items() if not math.isnan(x)},
             {side: centre_of(each, session) for side, each in self.centres.items()},
             self.xy_units_per_mm,
@@ -95,7 +95,7 @@ def measure_models(
     for records in measure_models_batch(
         Workstation(OperatorBatch.single(person), ScpiDriver(person), job, tick), begins
     ):
-        yield records.of(0)
+        yield records.for_session(0)
 
 
 def measure_models_batch(
@@ -115,7 +115,7 @@ def _worked(workstation: Workstation, begins: Callable[[str], None]) -> Iterator
     for model in job.models:
         begin_form(workstation, model, "interior orientation", begins)
         set_base_and_fittings(workstation, model.base, model.polarity)
-        mount_photographs(workstation, model, interior)
+        interior |= mount_photographs(workstation, model)
         prints = load_prints(workstation, model)
         require_active(workstation)
         workstation.begin(operators.active, model, prints)
@@ -229,9 +229,13 @@ def set_base_and_fittings(workstation: Workstation, base: str, polarity: str) ->
     workstation.controls.give_up_on_errors(active, f"setting base {base} and its fittings")
 
 
-def mount_photographs(workstation: Workstation, model: ModelJob, interior: dict[str, InteriorOrientationBatch]) -> None:
-    """Mount the photographs that are not yet mounted; a projector with a new picture starts from its counter zeros."""
+def mount_photographs(workstation: Workstation, model: ModelJob) -> dict[str, InteriorOrientationBatch]:
+    """Mount the photographs that are not yet mounted; return their interior orientations by photograph.
+
+    A projector with a new picture starts from its counter zeros.
+    """
     controls, driver = workstation.controls, workstation.driver
+    interior = {}
     for projector, photograph in ((model.left_projector, model.left), (model.right_projector, model.right)):
         active = workstation.operators.active
         if driver.loaded(active, projector) == photograph:
@@ -247,6 +251,7 @@ def mount_photographs(workstation: Workstation, model: ModelJob, interior: dict[
         interior[photograph] = interior_orientation(
             workstation, workstation.operators.active, projector, photograph, workstation.job.certificate
         )
+    return interior
 
 
 def load_prints(workstation: Workstation, model: ModelJob) -> dict[int, dict[str, Array]]:

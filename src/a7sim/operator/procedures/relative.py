@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import overload
+from typing import Generic, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -38,18 +38,48 @@ The next round corrects its effect.
 ALL_ELEMENTS = (*(f"{name}{n}" for name in ("kappa", "phi", "omega", "by", "bz", "c") for n in (1, 2)), "bx")
 
 
-@dataclass(frozen=True)
-class Round:
-    """Round of a session: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
+Value = TypeVar("Value")
+"""A number of one session, or an array ``(sessions,)`` of a batch."""
 
-    settings: Mapping[str, float]
-    parallaxes: Mapping[str, float]
-    mean: float
-    rms: float
-    sigmas: Mapping[str, float]
+
+@dataclass(frozen=True)
+class Round(Generic[Value]):
+    """Round of an orientation: the parallaxes at the points of the case, their mean, and their rms about it, mm."""
+
+    settings: Mapping[str, Value]
+    parallaxes: Mapping[str, Value]
+    mean: Value
+    rms: Value
+    sigmas: Mapping[str, Value]
     """Standard deviations of the corrections computed from this round, gon and mm; empty without corrections."""
-    over_correction: float = 0.0
+    over_correction: Value
     """Over-correction: multiple of the turn that clears the last point; zero if none was made."""
+
+
+@dataclass(frozen=True)
+class RoundBatch(Round[Array]):
+    """Round of the sessions that measured in it; the last axis of arrays contains all sessions."""
+
+    active: Indices
+    """Sessions that measured in it."""
+    corrected: Indices
+    """Sessions whose corrections were computed from it."""
+
+    @cached_property
+    def sessions(self) -> frozenset[int]:
+        """Sessions that measured in it, as a set."""
+        return frozenset(self.active.tolist())
+
+    def for_session(self, session: int) -> Round[float]:
+        """Return the round of one session."""
+        return Round(
+            _picked(self.settings, session),
+            _present(_picked(self.parallaxes, session)),
+            float(self.mean[session]),
+            float(self.rms[session]),
+            _picked(self.sigmas, session) if session in self.corrected else {},
+            float(self.over_correction[session]),
+        )
 
 
 @dataclass(frozen=True)
@@ -58,7 +88,7 @@ class OrientationRecord:
 
     method: str
     case: str
-    rounds: Sequence[Round]
+    rounds: Sequence[Round[float]]
     rough_rounds: int
     elements: Mapping[str, float]
     residuals: Mapping[str, float]
@@ -70,57 +100,6 @@ class OrientationRecord:
         """Rms in mm of the residual parallaxes at all standard points."""
         residuals = np.array(list(self.residuals.values()))
         return math.sqrt((residuals * residuals).mean())
-
-
-@dataclass(frozen=True)
-class RoundBatch:
-    """Round of the sessions that measured in it; the last axis of arrays contains all sessions."""
-
-    active: Indices
-    settings: Mapping[str, Array]
-    parallaxes: Mapping[str, Array]
-    mean: Array
-    rms: Array
-    corrected: Indices
-    sigmas: Mapping[str, Array]
-    over_correction: Array | None = None
-
-    @cached_property
-    def sessions(self) -> frozenset[int]:
-        """Sessions that measured in it, as a set."""
-        return frozenset(self.active.tolist())
-
-    def of(self, session: int) -> Round:
-        """Return the round of one session."""
-        return Round(
-            _picked(self.settings, session),
-            _present(_picked(self.parallaxes, session)),
-            float(self.mean[session]),
-            float(self.rms[session]),
-            _picked(self.sigmas, session) if session in self.corrected else {},
-            0.0 if self.over_correction is None else float(self.over_correction[session]),
-        )
-
-
-class SessionRounds(Sequence[Round]):
-    """Rounds of one session, each built on access."""
-
-    def __init__(self, session: int, rounds: Sequence[RoundBatch]) -> None:
-        self._session, self._rounds = session, rounds
-
-    def __len__(self) -> int:
-        return len(self._rounds)
-
-    @overload
-    def __getitem__(self, at: int) -> Round: ...
-
-    @overload
-    def __getitem__(self, at: slice) -> Sequence[Round]: ...
-
-    def __getitem__(self, at: int | slice) -> Round | Sequence[Round]:
-        if isinstance(at, slice):
-            return SessionRounds(self._session, self._rounds[at])
-        return self._rounds[at].of(self._session)
 
 
 @dataclass(frozen=True)
@@ -151,14 +130,14 @@ class OrientationRecordBatch:
             {label: list(zip(*each.tolist(), strict=True)) for label, each in self.places.items()},
         )
 
-    def of(self, session: int) -> OrientationRecord:
+    def for_session(self, session: int) -> OrientationRecord:
         """Return the orientation of one session."""
         listed = self._listed
         residuals = _present(_picked(listed.residuals, session))
         return OrientationRecord(
             self.method,
             self.case,
-            SessionRounds(session, [each for each in self.rounds if session in each.sessions]),
+            [each.for_session(session) for each in self.rounds if session in each.sessions],
             int(self.rough_rounds[session]),
             _picked(listed.elements, session),
             residuals,
@@ -285,7 +264,16 @@ def _oriented(
         )
         falling = operators.remaining(falling)
         rounds.append(
-            RoundBatch(together, settings, dict(zip(labels, seen.parallax_mm, strict=True)), mean, rms, falling, sigmas)
+            RoundBatch(
+                settings,
+                dict(zip(labels, seen.parallax_mm, strict=True)),
+                mean,
+                rms,
+                sigmas,
+                np.zeros(operators.size),
+                together,
+                falling,
+            )
         )
         if falling.size:
             noted = operators.noted_elements(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})

@@ -14,7 +14,6 @@ from a7sim.operator.driving.scpi_driver import ScpiDriver
 from a7sim.operator.driving.workstation import Workstation
 from a7sim.operator.people.observation_book import BookEntry
 from a7sim.operator.people.operator_batch import OperatorBatch
-from a7sim.operator.procedures.interior import InteriorOrientationBatch
 from a7sim.operator.procedures.models import load_prints, mount_photographs, orient_model, set_base_and_fittings
 from a7sim.plotters import VARIANTS
 from a7sim.reduction import Undetermined
@@ -62,8 +61,7 @@ class ProcedureContext:
         workstation.controls.prepare(active)
         self.begin("interior orientation")
         set_base_and_fittings(workstation, self.model.base, self.model.polarity)
-        orientations: dict[str, InteriorOrientationBatch] = {}
-        mount_photographs(workstation, self.model, orientations)
+        mount_photographs(workstation, self.model)
         workstation.begin(active, self.model, load_prints(workstation, self.model))
 
     def take_over(self) -> None:

@@ -146,7 +146,7 @@ def base_change(
     if counters:
         extend_strip(workstation, model)
     set_base_and_fittings(workstation, model.base, model.polarity)
-    mount_photographs(workstation, model, {})
+    mount_photographs(workstation, model)
     workstation.begin(operators.active, model, load_prints(workstation, model))
     copy_common_photo_orientation(workstation, model)
     context.begin("relative orientation")
