@@ -135,13 +135,13 @@ class Compilation:
     def _place(self) -> Array:
         return np.asarray(self._workstation.controls.counters(self._active)[:2, 0])
 
-    def _registered(self, name: str) -> Array:
+    def _register(self, name: str) -> Array:
         """Register the mark under a name and return the registered readings ``(3,)``."""
         self._workstation.operators.spend(self._active, self._tracing.seconds_per_vertex, "turning")
         fields = self._person.client.fields(f'REC "{name}";:REC:LAST?')
         return np.array(fields[2:5], dtype=float)
 
-    def _seen(
+    def _look_until_fused(
         self, expected: PerceivedSurface | None = None, looks: Sequence[tuple[float, float]] = _CLOSELY
     ) -> tuple[StereoPatch, PerceivedSurface] | None:
         """Look at the ground, with a widening search, until it fuses; None if it does not."""
@@ -184,7 +184,7 @@ class Compilation:
     def _spot(self) -> Array | None:
         observer = self._workstation.operators.observer
         self._workstation.operators.spend(self._active, observer.seconds_to_look, "looking")
-        seen = self._seen(looks=_WIDELY)
+        seen = self._look_until_fused(looks=_WIDELY)
         for _ in range(_MAX_LOOKS):
             if seen is None:
                 return None
@@ -192,9 +192,9 @@ class Compilation:
             if look.pitch <= MIDDLING_MM and abs(surface.height) < _NEAR_ENOUGH_MM:
                 _, error = self._tremor(look)
                 self._turn(np.zeros(2), surface.height + error)
-                return self._registered("spot height")
+                return self._register("spot height")
             self._turn(np.zeros(2), surface.height)
-            seen = self._seen()
+            seen = self._look_until_fused()
         return None
 
     # --- contours -------------------------------------------------------------------------------------
@@ -212,7 +212,7 @@ class Compilation:
             start = self._find_contour(guess, None)
             if start is None or any(distance_to(line.readings[:2], start.place) < _SAME_LINE_MM for line in lines):
                 continue
-            found = self._both_ways(name, height, start, z, lines)
+            found = self._follow_both_ways(name, height, start, z, lines)
             vertices = found.readings.shape[1]
             if vertices < 2 or ("joined" in found.endings and length_along(found.readings[:2]) < _STUB_MM):
                 self._person.client.send(
@@ -222,20 +222,22 @@ class Compilation:
                 lines.append(found)
         return lines
 
-    def _both_ways(self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[TracedLine]) -> TracedLine:
-        outward, ending = self._followed(name, start, drawn)
+    def _follow_both_ways(
+        self, name: str, height: float, start: _Vertex, z: float, drawn: Sequence[TracedLine]
+    ) -> TracedLine:
+        outward, ending = self._follow_contour(name, start, drawn)
         if ending == "closed":
             return TracedLine(name, CONTOUR, height, as_polyline([*outward, outward[0]]), ("closed", "closed"))
         self._drive(start.place, z)
-        back, other = self._followed(name, replace(start, heading=-start.heading), drawn)
+        back, other = self._follow_contour(name, replace(start, heading=-start.heading), drawn)
         return TracedLine(name, CONTOUR, height, as_polyline([*back[::-1], *outward]), (other, ending))
 
-    def _followed(self, name: str, start: _Vertex, drawn: Sequence[TracedLine]) -> tuple[list[Array], Ending]:
+    def _follow_contour(self, name: str, start: _Vertex, drawn: Sequence[TracedLine]) -> tuple[list[Array], Ending]:
         """Follow a contour from a position on it; return its vertices and how it ended."""
         vertices: list[Array] = []
         at, step, bend = start, FIRST_STEP_MM, 0.0
         while len(vertices) < _MAX_VERTICES:
-            wanted = step * _turned(at.heading, bend / 2.0)
+            wanted = step * _rotate(at.heading, bend / 2.0)
             cut = self.area.clip_step(at.place, wanted)
             if length_of(cut) < 1e-2:
                 return vertices, "edge"
@@ -266,7 +268,7 @@ class Compilation:
         """Move the mark near the contour at its height; return the vertex there, None if none is found."""
         expected = None if before is None else PerceivedSurface(0.0, before.surface.slope, 0.0, 1.0)
         for number in range(_MAX_LOOKS):
-            seen = self._seen(expected, _CLOSELY if number or before is not None else _WIDELY)
+            seen = self._look_until_fused(expected, _CLOSELY if number or before is not None else _WIDELY)
             if seen is None:
                 return None
             look, surface = seen
@@ -283,7 +285,7 @@ class Compilation:
             strike = np.array([-surface.slope[1], surface.slope[0]]) / np.sqrt(steepness)
             if before is not None and strike @ before.heading < 0.0:
                 strike = -strike
-            if before is not None and _strayed(before, place, here, strike):
+            if before is not None and _has_strayed(before, place, here, strike):
                 return None
             return _Vertex(here, strike, surface, look, back)
         return None
@@ -295,7 +297,7 @@ class Compilation:
         steepness = np.sqrt(float(slope @ slope))
         misjudged = np.clip(error / steepness, -_MAX_CORRECTION_MM, _MAX_CORRECTION_MM)
         self._turn(vertex.correction + along * vertex.heading + (across + misjudged) * (slope / steepness))
-        return self._registered(name)
+        return self._register(name)
 
     # --- lines ----------------------------------------------------------------------------------------
 
@@ -311,7 +313,7 @@ class Compilation:
                 f"{self._workstation.controls.model.name}: no {target.kind} is seen where the map shows {target.name}",
             )
             raise AssertionError
-        vertices, ending = self._line_followed(target.name, found, end)
+        vertices, ending = self._follow_road(target.name, found, end)
         readings = np.array(vertices).reshape(-1, 3).T
         return TracedLine(target.name, target.kind, None, readings, ("end", ending))
 
@@ -321,19 +323,19 @@ class Compilation:
         )
         return np.asarray(self.model.readings_of(np.array([*plan, level[2]]))[:2])
 
-    def _line_followed(self, name: str, road: "_Road", end: Array) -> tuple[list[Array], Ending]:
+    def _follow_road(self, name: str, road: "_Road", end: Array) -> tuple[list[Array], Ending]:
         vertices: list[Array] = []
         step, bend = FIRST_STEP_MM, 0.0
         while len(vertices) < _MAX_VERTICES:
             (along, across), error = self._tremor(road.look)
-            shaken = road.offset + along * road.heading + across * _turned(road.heading, np.pi / 2.0)
+            shaken = road.offset + along * road.heading + across * _rotate(road.heading, np.pi / 2.0)
             start = self._place()
             self._turn(shaken, road.surface.above(shaken) + error)
-            vertices.append(self._registered(name))
+            vertices.append(self._register(name))
             left = end - start - road.offset
             if length_of(left) < _END_REACHED_MM and left @ road.heading < step:
                 return vertices, "end"
-            forward = step * _turned(road.heading, bend / 2.0)
+            forward = step * _rotate(road.heading, bend / 2.0)
             cut = self.area.clip_step(start + road.offset, forward)
             if length_of(cut) < length_of(forward) - 1e-9:
                 return vertices, "edge"
@@ -353,10 +355,10 @@ class Compilation:
     ) -> "_Road | None":
         """Find a light band near the mark with a direction ``(2,)``, `within` an angle in radians."""
         slope = None if expected is None else PerceivedSurface(0.0, expected.slope, 0.0, 1.0)
-        seen = self._seen(slope, _ON_ROADS)
+        seen = self._look_until_fused(slope, _ON_ROADS)
         if seen is not None and seen[0].pitch != ROAD_MM:
             self._turn(np.zeros(2), seen[1].height)
-            seen = self._seen(looks=_ON_ROADS[:2])
+            seen = self._look_until_fused(looks=_ON_ROADS[:2])
         if seen is None:
             return None
         look, surface = seen
@@ -387,20 +389,20 @@ def _band(
     grey = (grey - grey.mean()) / max(float(grey.std()), 1e-6)
     turns = np.linspace(-within, within, 25)
     offsets = np.arange(-0.7 * radius, 0.7 * radius, look.spacing)
-    fits = np.array([_fit(grey, plan, _turned(heading, turn), offsets, width, look.spacing) for turn in turns])
+    fits = np.array([_fit(grey, plan, _rotate(heading, turn), offsets, width, look.spacing) for turn in turns])
     k, j = np.unravel_index(int(np.argmax(fits)), fits.shape)
     turn = turns[k] + (turns[1] - turns[0]) * _peak(fits[:, j], int(k))
-    towards = _turned(heading, turn)
+    towards = _rotate(heading, turn)
     fine = offsets[j] + look.spacing * np.linspace(-1.5, 1.5, 13)
     fitted = _fit(grey, plan, towards, fine, width, look.spacing)
     best = int(np.argmax(fitted))
     offset = fine[best] + (fine[1] - fine[0]) * _peak(fitted, best)
-    return float(fitted[best]), offset * _turned(towards, np.pi / 2.0), towards, width
+    return float(fitted[best]), offset * _rotate(towards, np.pi / 2.0), towards, width
 
 
 def _fit(grey: Array, plan: Array, direction: Array, offsets: Array, width: float, spacing: float) -> Array:
     """Return the correlations ``(k,)`` of greys ``(n,)`` with bands of one direction at offsets ``(k,)``."""
-    across = _turned(direction, np.pi / 2.0) @ plan
+    across = _rotate(direction, np.pi / 2.0) @ plan
     bands = np.clip((width / 2.0 - np.abs(across - offsets[:, None])) / spacing + 0.5, 0.0, 1.0)
     spread = bands.std(axis=1)
     return np.asarray(
@@ -417,7 +419,7 @@ def _peak(values: Array, at: int) -> float:
     return float(np.clip(0.5 * (before - after) / bend, -1.0, 1.0)) if bend < 0.0 else 0.0
 
 
-def _strayed(before: _Vertex, wanted: Array, here: Array, heading: Array) -> bool:
+def _has_strayed(before: _Vertex, wanted: Array, here: Array, heading: Array) -> bool:
     """Return whether a correction led to an impossible position: perhaps another contour beyond a saddle."""
     step = float(length_of(wanted - before.place))
     return bool(
@@ -429,7 +431,7 @@ def _at_height(place: Array, height: float) -> Array:
     return np.array([place[0], place[1], height])
 
 
-def _turned(direction: Array, angle: float) -> Array:
+def _rotate(direction: Array, angle: float) -> Array:
     sine, cosine = np.sin(angle), np.cos(angle)
     return np.array([cosine * direction[0] - sine * direction[1], sine * direction[0] + cosine * direction[1]])
 

@@ -70,12 +70,12 @@ def level_model(
         fit = levelling.compared(operators.active, levelling.measured(operators.active, 1))
         rounds = len(levelling.level(operators.active, fit, scale_number)[0]) - 1
         view.read_projectors()
-        points = _measured(workstation, wanted)
-    absolute = orient_model(workstation, points, control, units)
+        points = _measure_again(workstation, wanted)
+    absolute = orient_to_ground(workstation, points, control, units)
     return LevelModel(absolute, points, scale_number, _tilt(absolute), units, rounds)
 
 
-def _measured(workstation: Workstation, names: Sequence[str]) -> dict[str, Place]:
+def _measure_again(workstation: Workstation, names: Sequence[str]) -> dict[str, Place]:
     readings = workstation.measure_points(workstation.operators.active, names)[:, :, 0].T
     return {
         name: (float(X), float(Y), float(Z))
@@ -84,7 +84,7 @@ def _measured(workstation: Workstation, names: Sequence[str]) -> dict[str, Place
     }
 
 
-def orient_model(
+def orient_to_ground(
     workstation: Workstation, points: Mapping[str, Place], control: Ground, units: float
 ) -> AbsoluteOrientation:
     """Return the orientation to the ground of a model with measured control; gives up without control."""

@@ -13,7 +13,7 @@ from a7sim.operator.driving.job import Job
 from a7sim.operator.driving.scpi_driver import ScpiDriver
 from a7sim.operator.driving.workstation import Workstation
 from a7sim.operator.mapping.compilation import Compilation
-from a7sim.operator.mapping.level_model import LevelModel, level_model, orient_model
+from a7sim.operator.mapping.level_model import LevelModel, level_model, orient_to_ground
 from a7sim.operator.mapping.map_lines import Area, LineTarget, SpotHeights, TracedLine, Tracing
 from a7sim.operator.mapping.preparation import PLAN_GEARS
 from a7sim.operator.mapping.stereo_view import StereoView
@@ -97,7 +97,7 @@ def compile_map(
     begin_form(workstation, workstation.controls.model, "absolute orientation", begins)
     gear = TABLE_GEARS[job.plan.plan_gear]
     corners = {label: record.model.standard_points.get(label, "") for label in "3456"}
-    first = orient_model(workstation, record.points, control, record.z_units_per_mm)
+    first = orient_to_ground(workstation, record.points, control, record.z_units_per_mm)
     number = gear * (order.map_scale or _round_scale(1e3 * float(first.similarity.scale) / gear))
     model = level_model(workstation, view, record.points, control, number, list(corners.values()))
     seen = [label for label, name in corners.items() if name in model.points]
@@ -121,7 +121,7 @@ def compile_map(
         begin_form(workstation, workstation.controls.model, f"line {target.name}", begins)
         lines.append(work.line(target, spots))
         tick()
-    above, sigma_height, sigma_plan = _expected(workstation, view, model, spots, order.tracing)
+    above, sigma_height, sigma_plan = _expected_errors(workstation, view, model, spots, order.tracing)
     return CompiledMap(
         replace(record, finished_at=float(workstation.operators.seconds[0])),
         model, area, spots, tuple(lines), heights, gear, above, sigma_height, sigma_plan,
@@ -152,7 +152,7 @@ def _heights(order: MapRequest, spots: SpotHeights) -> tuple[float, ...]:
     return tuple(sorted(heights))
 
 
-def _expected(
+def _expected_errors(
     workstation: Workstation, view: StereoView, model: LevelModel, spots: SpotHeights, tracing: Tracing
 ) -> tuple[float, float, float]:
     """Return the height of the centres above the mean spot in m, and the expected standard errors in m."""

@@ -189,14 +189,14 @@ class StereoView:
             heights = start[0] + np.arange(-reach, reach + per_element, 0.75 * per_element)
             tried = [_correlation(look, np.array([h, *start[1:]])) for h in heights]
             start[0] = heights[int(np.argmax(tried))]
-        return _matched(look, start)
+        return _match_surface(look, start)
 
 
-def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
+def _match_surface(look: StereoPatch, surface: Array) -> PerceivedSurface:
     """Return the plane for which both images agree best, by Gauss-Newton from a plane nearby."""
     scale = np.array([1.0, 10.0, 10.0, 1.0])
     for _ in range(_MAX_STEPS):
-        left, right, left_slopes, right_slopes, plan = _compared(look, surface)
+        left, right, left_slopes, right_slopes, plan = _compare_images(look, surface)
         if left.size < _PATCH:
             return PerceivedSurface(0.0, np.zeros(2), 0.0, 0.0)
         left_spread, right_spread = left.std(), right.std()
@@ -216,29 +216,29 @@ def _matched(look: StereoPatch, surface: Array) -> PerceivedSurface:
     return PerceivedSurface(float(surface[0]), surface[1:3].copy(), float(surface[3]), _correlation(look, surface))
 
 
-def _compared(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _compare_images(look: StereoPatch, surface: Array) -> tuple[Array, Array, Array, Array, Array]:
     """Return the greys of a surface in both images, their gradients, and the positions.
 
     Greys ``(n,)``, gradients per mm ``(2, n)``, positions ``(2, n)``. Positions covered by the mark or outside either
     image are left out.
     """
-    between, plan = _seen_by_both(look, surface)
+    samples, plan = _sample_both_images(look, surface)
     sense = np.array([[1.0], [-1.0]])
-    left_slopes, right_slopes = (each.slopes * sense / look.pitch for each in between)
-    return between[0].greys, between[1].greys, left_slopes, right_slopes, plan
+    left_slopes, right_slopes = (each.slopes * sense / look.pitch for each in samples)
+    return samples[0].greys, samples[1].greys, left_slopes, right_slopes, plan
 
 
-def _seen_by_both(look: StereoPatch, surface: Array) -> tuple[list["_Between"], Array]:
+def _sample_both_images(look: StereoPatch, surface: Array) -> tuple[list["_GreySamples"], Array]:
     """Return the positions where both images show a surface clear of the mark, and the displacements ``(2, n)``."""
     plan, seen = look.places(surface)
     columns, rows, plain = look.elements_at(seen)
     keep = plain.all(axis=0)
-    between = [_Between.of(look.pictures[eye], columns[eye, keep], rows[eye, keep]) for eye in (0, 1)]
-    return between, plan[:, keep]
+    samples = [_GreySamples.from_picture(look.pictures[eye], columns[eye, keep], rows[eye, keep]) for eye in (0, 1)]
+    return samples, plan[:, keep]
 
 
 @dataclass(frozen=True)
-class _Between:
+class _GreySamples:
     """Positions ``(n,)`` between picture elements.
 
     Fractions to the right and down, and the greys about them with their differences.
@@ -252,7 +252,7 @@ class _Between:
     lower_change: Array
 
     @classmethod
-    def of(cls, picture: Array, columns: Array, rows: Array) -> "_Between":
+    def from_picture(cls, picture: Array, columns: Array, rows: Array) -> "_GreySamples":
         j, i = columns.astype(np.intp), rows.astype(np.intp)
         first, width, elements = i * picture.shape[1] + j, picture.shape[1], picture.ravel()
         a, c = elements.take(first), elements.take(first + width)
@@ -277,7 +277,7 @@ class _Between:
 
 def _correlation(look: StereoPatch, surface: Array) -> float:
     """Return the correlation of the greys of a surface in both images."""
-    left, right = (each.greys for each in _seen_by_both(look, surface)[0])
+    left, right = (each.greys for each in _sample_both_images(look, surface)[0])
     spread = float(left.std() * right.std()) if left.size >= _PATCH else 0.0
     return float(((left - left.mean()) * (right - right.mean())).mean()) / spread if spread > 0.0 else 0.0
 
@@ -292,5 +292,5 @@ def rectify(look: StereoPatch, surface: PerceivedSurface, side: int) -> tuple[np
     seen = look.shown[0] @ np.concatenate([plan, [surface.height + surface.slope @ plan]])
     columns, rows, inside = look.elements_at(seen)
     grey = np.zeros(inside.size)
-    grey[inside] = _Between.of(look.pictures[0], columns[inside], rows[inside]).greys
+    grey[inside] = _GreySamples.from_picture(look.pictures[0], columns[inside], rows[inside]).greys
     return inside, grey, plan

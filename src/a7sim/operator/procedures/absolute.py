@@ -69,7 +69,7 @@ def absolute_orientation_at(
         gears = np.array([_gear(workstation, float(metres)) for metres in fit.metres])
         for gear in dict.fromkeys(gears.tolist()):
             same = operators.is_active(active) & (gears == gear)
-            found |= _InMetres(levelling, gear).done(active[same], fit.of(same), before, start)
+            found |= _GearLevelling(levelling, gear).run(active[same], fit.of(same), before, start)
     return found
 
 
@@ -81,8 +81,8 @@ def _gear(workstation: Workstation, metres: float) -> str:
     return min(gears, key=lambda name: abs(math.log(gears[name].units_per_mm / metres)))
 
 
-class _InMetres:
-    """Sessions whose models are levelled to the same scale, that of the gear by which their counters read metres."""
+class _GearLevelling:
+    """Levelling of models to the scale of a height gear, by which their counters read metres."""
 
     def __init__(self, levelling: Levelling, gear: str) -> None:
         self.levelling, self.workstation, self.control = levelling, levelling.workstation, levelling.control
@@ -90,7 +90,7 @@ class _InMetres:
         self.gear = gear
         self.number = 1e3 * self.controls.manual.height_gears[gear].units_per_mm
 
-    def done(self, active: Indices, fit: Fit, before: Settings, start: Array) -> dict[int, GroundOrientation]:
+    def run(self, active: Indices, fit: Fit, before: Settings, start: Array) -> dict[int, GroundOrientation]:
         """Level, read and reset to settings and readings of Z ``(sessions,)``."""
         self.controls.drive(active, {"Z": start[active]})
         self.controls.set_height_gear(active, self.gear)
@@ -99,14 +99,14 @@ class _InMetres:
         )
         active = self.operators.remaining(active)
         shift = np.zeros(self.operators.size)
-        shift[active] = self._index_set(active)
-        readings = self._read(active)
+        shift[active] = self._set_index(active)
+        readings = self._measure_points(active)
         active = self.operators.remaining(active)
-        found = self._concluded(active, rounds, before, self.levelling.settings(active), readings)
-        self._set_back(active, before, start, shift)
+        found = self._collect_results(active, rounds, before, self.levelling.settings(active), readings)
+        self._reset(active, before, start, shift)
         return found
 
-    def _index_set(self, active: Indices) -> Array:
+    def _set_index(self, active: Indices) -> Array:
         """Index the Z counter to heights, on the mean of the control; return the change of its reading ``(m,)``."""
         names = [self.control.names[i] for i in self.control.with_height]
         self.workstation.begin_round(active, MAX_ROUNDS + 1)
@@ -114,14 +114,14 @@ class _InMetres:
         more = np.mean(self.control.ground[2, self.control.with_height][:, None] - readings, axis=0)
         return self.controls.shift_counter(active, "Z", more)
 
-    def _read(self, active: Indices) -> dict[str, Array]:
+    def _measure_points(self, active: Indices) -> dict[str, Array]:
         """Measure control and all other visible points; X, Y in mm and Z in m ``(3, sessions)``."""
         self.workstation.begin_round(active, MAX_ROUNDS + 2)
         wanted = dict.fromkeys([*self.control.names, *self.controls.model.other_points])
         names = [name for name in wanted if self.workstation.has_point(active, name).all()]
         return dict(zip(names, np.moveaxis(self.workstation.measure_points(active, names), 1, 0), strict=True))
 
-    def _concluded(
+    def _collect_results(
         self,
         active: Indices,
         rounds: Mapping[int, Sequence[LevellingRound]],
@@ -151,7 +151,7 @@ class _InMetres:
             for s in active
         }
 
-    def _set_back(self, active: Indices, before: Settings, start: Array, shift: Array) -> None:
+    def _reset(self, active: Indices, before: Settings, start: Array, shift: Array) -> None:
         """Reset elements, index and gear."""
         if active.size:
             self.controls.shift_counter(active, "Z", -shift[active])

@@ -87,12 +87,12 @@ def bridge_strip_batch(
     otherwise the operator gives up.
     """
     try:
-        yield from _bridged(workstation, begins)
+        yield from _bridge_each_model(workstation, begins)
     except AllGaveUpError:
         return
 
 
-def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
+def _bridge_each_model(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[BridgedModels]:
     operators, controls, job = workstation.operators, workstation.controls, workstation.job
     controls.prepare(operators.active)
     before: dict[str, Array] = {}
@@ -100,7 +100,7 @@ def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterato
     for model in job.models:
         begin_form(workstation, model, "interior orientation", begins)
         if last is not None:
-            _see_that_it_follows(workstation, last, model)
+            _require_continuation(workstation, last, model)
             extend_strip(workstation, model)
         set_base_and_fittings(workstation, model.base, model.polarity)
         mount_photographs(workstation, model)
@@ -112,12 +112,12 @@ def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterato
         else:
             copy_common_photo_orientation(workstation, model)
         begin_form(workstation, model, "relative orientation", begins)
-        orientation = _oriented(workstation, model)
+        orientation = _orient_new_photograph(workstation, model)
         scale = np.ones(operators.size)
         if last is not None:
             begin_form(workstation, model, "scale", begins)
             scale = transfer_scale(workstation, operators.active, model, before)
-        orientation = _refined(workstation, model, orientation)
+        orientation = _refine_orientation(workstation, model, orientation)
         if last is not None:
             scale *= transfer_scale(workstation, operators.active, model, before)
         begin_form(workstation, model, "model coordinates", begins)
@@ -128,7 +128,7 @@ def _bridged(workstation: Workstation, begins: Callable[[str], None]) -> Iterato
         before, last = points, model
 
 
-def _see_that_it_follows(workstation: Workstation, last: ModelJob, model: ModelJob) -> None:
+def _require_continuation(workstation: Workstation, last: ModelJob, model: ModelJob) -> None:
     if model.left != last.right or model.left_projector != last.right_projector:
         workstation.operators.give_up(
             workstation.operators.active,
@@ -171,7 +171,7 @@ def copy_common_photo_orientation(workstation: Workstation, model: ModelJob) -> 
     controls.set_elements(active, {"bx": np.full(active.size, workstation.job.plan.bx)} | within)
 
 
-def _oriented(workstation: Workstation, model: ModelJob) -> OrientationRecordBatch:
+def _orient_new_photograph(workstation: Workstation, model: ModelJob) -> OrientationRecordBatch:
     plan, active, tolerated = workstation.job.plan, workstation.operators.active, workstation.job.tolerated_parallax_mm
     return relative_orientation(
         workstation, active, model, "dependent", plan.case, plan.parallax_readings, plan.bx, tolerated
@@ -229,7 +229,9 @@ def transfer_scale(workstation: Workstation, active: Indices, model: ModelJob, b
 # --- refinement -------------------------------------------------------------------------------------------------------
 
 
-def _refined(workstation: Workstation, model: ModelJob, found: OrientationRecordBatch) -> OrientationRecordBatch:
+def _refine_orientation(
+    workstation: Workstation, model: ModelJob, found: OrientationRecordBatch
+) -> OrientationRecordBatch:
     """Look at the residuals at all standard points and correct the new photograph while they decrease.
 
     The eye resolves less than a count, and a drum turns finer than it reads; the settings with the smallest residual

@@ -80,22 +80,22 @@ def centre_of(centres: PerspectiveCentre, session: int) -> PerspectiveCentre:
     return PerspectiveCentre(*parts)
 
 
-def _among_all(centres: PerspectiveCentre, active: Indices, sessions: int) -> PerspectiveCentre:
+def _expand_to_batch(centres: PerspectiveCentre, active: Indices, sessions: int) -> PerspectiveCentre:
     def spread(values: Array) -> Array:
         every = np.full((*values.shape[:-1], sessions), np.nan)
         every[..., active] = values
         return every
 
-    return PerspectiveCentre(*_each(centres, spread))
+    return PerspectiveCentre(*_change_values(centres, spread))
 
 
-def _nowhere(sessions: int) -> PerspectiveCentre:
+def _unknown_centres(sessions: int) -> PerspectiveCentre:
     nothing = np.full(sessions, np.nan)
     values = {field.name: nothing for field in fields(PerspectiveCentre)}
     return PerspectiveCentre(**values | {"residuals": np.full((3, 0, sessions), np.nan)})
 
 
-def _each(found: PerspectiveCentre | PlatePlacement, change: Callable[[Array], Array]) -> list[Any]:
+def _change_values(found: PerspectiveCentre | PlatePlacement, change: Callable[[Array], Array]) -> list[Any]:
     values = (getattr(found, field.name) for field in fields(found))
     return [None if each is None else change(each) for each in values]
 
@@ -151,10 +151,12 @@ def _by_levels(
                 f"{model.name}: {len(chosen)} of the standard points are pricked on the print of the {side_name(side)} "
                 f"photograph: there must be {MIN_POINTS} for its perspective centre",
             )
-    return _gathered(groups, operators.size)
+    return _merge_groups(groups, operators.size)
 
 
-def _gathered(groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]], sessions: int) -> PerspectiveCentre:
+def _merge_groups(
+    groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]], sessions: int
+) -> PerspectiveCentre:
     """Return the centres of groups with different points as one batch, nan for the other sessions."""
     points = list(dict.fromkeys(name for _, names, _ in groups for name in names))
     every: dict[str, Array] = {}
@@ -166,7 +168,7 @@ def _gathered(groups: Sequence[tuple[Indices, Sequence[str], PerspectiveCentre]]
                 residuals[:, np.array(slots)[:, None], active] = values
             elif values is not None:
                 every.setdefault(name, np.full(sessions, np.nan))[active] = values
-    return PerspectiveCentre(**every) if every else _nowhere(sessions)
+    return PerspectiveCentre(**every) if every else _unknown_centres(sessions)
 
 
 def _of_points(
@@ -178,12 +180,12 @@ def _of_points(
     outlier, a second set is observed and both are averaged.
     """
     operators = workstation.operators
-    pointings = _one_set(workstation, active, side, points, levels)
+    pointings = _observe_set(workstation, active, side, points, levels)
     active = operators.remaining(active)
     doubtful = active[_rms(pointings[..., active], levels) > SUSPICIOUS_RMS]
     if doubtful.size:
         operators.remark(doubtful, f"{model.name}: the points of the centre fit badly, a second set is observed")
-        again = _one_set(workstation, doubtful, side, points, levels)
+        again = _observe_set(workstation, doubtful, side, points, levels)
         pointings[..., doubtful] = (pointings[..., doubtful] + again[..., doubtful]) / 2.0
         active = operators.remaining(active)
     return _centre(pointings[..., active], levels)
@@ -200,7 +202,7 @@ def _rms(pointings: Array, levels: Levels) -> Array:
     return _centre(pointings, levels).rms
 
 
-def _one_set(workstation: Workstation, active: Indices, side: int, points: Sequence[str], levels: Levels) -> Array:
+def _observe_set(workstation: Workstation, active: Indices, side: int, points: Sequence[str], levels: Levels) -> Array:
     """Return pointings ``(2, k, n, sessions)`` at k levels."""
     operators = workstation.operators
     pointings = np.stack(
@@ -215,11 +217,11 @@ def _one_set(workstation: Workstation, active: Indices, side: int, points: Seque
         if not looking.size:
             break
         why = f"does not agree with the other points at the {'two ' if len(levels) == 2 else ''}levels"
-        for place in np.unique(misread):
-            again = looking[misread == place]
+        for index in np.unique(misread):
+            again = looking[misread == index]
             for i, level in enumerate(levels.tolist()):
-                pointed = workstation.repeat_pointing(again, side, points[place], level, why)
-                pointings[:, i, place, again] = pointed[:, again]
+                pointed = workstation.repeat_pointing(again, side, points[index], level, why)
+                pointings[:, i, index, again] = pointed[:, again]
         looking = operators.remaining(looking)
         workstation.compute(looking)
     return pointings
@@ -237,7 +239,7 @@ def _misread_points(pointings: Array, levels: Levels) -> npt.NDArray[np.intp]:
 
 
 def _by_grid_plate(
-    workstation: Workstation, active: Indices, model: ModelJob, hand: int, levels: Levels
+    workstation: Workstation, active: Indices, model: ModelJob, side: int, levels: Levels
 ) -> PerspectiveCentre:
     """Mount the grid plate in place of the picture, point at its crosses at all levels, and mount the picture again.
 
@@ -246,31 +248,31 @@ def _by_grid_plate(
     operators, job = workstation.operators, workstation.job
     plate = job.grid_plate
     certificate = plate.certificate(job.certificate)
-    projector = workstation.controls.projector(hand)
-    picture = model.left if hand == 1 else model.right
+    projector = workstation.controls.projector(side)
+    picture = model.left if side == 1 else model.right
     centre_picture(workstation, active, projector, plate.name, certificate)
-    lie = locate_plate(workstation, operators.remaining(active), projector, certificate, times=1)
-    workstation.pointing.set_prints({hand: sketch_positions(workstation, operators.remaining(active), projector)})
-    crosses = _crosses_in_model(workstation, operators.remaining(active), hand, levels)
+    placements = locate_plate(workstation, operators.remaining(active), projector, certificate, times=1)
+    workstation.pointing.set_prints({side: sketch_positions(workstation, operators.remaining(active), projector)})
+    crosses = _crosses_in_model(workstation, operators.remaining(active), side, levels)
     if len(crosses) < MIN_CROSSES:
         operators.give_up(
             active, f"{model.name}: too few crosses of plate {plate.name} lie within the model for a centre"
         )
-        return _nowhere(operators.size)
+        return _unknown_centres(operators.size)
     pointings = np.stack(
-        [point_at_crosses(workstation, operators.remaining(active), hand, crosses, level) for level in levels.tolist()],
+        [point_at_crosses(workstation, operators.remaining(active), side, crosses, level) for level in levels.tolist()],
         axis=1,
     )
     active = operators.remaining(active)
     workstation.compute(active)
     c = workstation.controls.elements(active, [f"c{projector}"])[f"c{projector}"]
-    its_lie = PlatePlacement(*_each(lie, lambda values: values[active]))
-    found = _resected(workstation, crosses, pointings[..., active], levels, c, its_lie)
-    centres = _among_all(found, active, operators.size)
+    placement = PlatePlacement(*_change_values(placements, lambda values: values[active]))
+    found = _resect_centres(workstation, crosses, pointings[..., active], levels, c, placement)
+    centres = _expand_to_batch(found, active, operators.size)
     centre_picture(workstation, active, projector, picture, job.certificate)
     active = operators.remaining(active)
     workstation.pointing.set_prints(
-        {side: sketch_positions(workstation, active, workstation.controls.projector(side)) for side in (1, 2)}
+        {n: sketch_positions(workstation, active, workstation.controls.projector(n)) for n in (1, 2)}
     )
     return centres
 
@@ -298,20 +300,20 @@ def _crosses_in_model(workstation: Workstation, active: Indices, side: int, leve
     return next(enough, {})
 
 
-def _resected(
-    workstation: Workstation, crosses: Crosses, pointings: Array, levels: Levels, c: Array, lie: PlatePlacement
+def _resect_centres(
+    workstation: Workstation, crosses: Crosses, pointings: Array, levels: Levels, c: Array, placement: PlatePlacement
 ) -> PerspectiveCentre:
     """Return the centres ``(m,)`` from pointings ``(2, k, n, m)`` at crosses, in counter units."""
     k, n = pointings.shape[1:3]
     units = workstation.controls.units_per_mm
-    placed = np.tile(lie.placed(cross_positions(crosses)), (1, k, 1))
+    placed = np.tile(placement.placed(cross_positions(crosses)), (1, k, 1))
     heights = np.repeat(levels / units, n)[:, None]
     found = grid_plate_centre(placed, pointings.reshape(2, k * n, -1), heights, c)
-    return _in_counter_units(found, levels, units, c, lie)
+    return _in_counter_units(found, levels, units, c, placement)
 
 
 def _in_counter_units(
-    found: Resection, levels: Levels, units: float, c: Array, lie: PlatePlacement
+    found: Resection, levels: Levels, units: float, c: Array, placement: PlatePlacement
 ) -> PerspectiveCentre:
     """Return a resected centre in the form of a centre by levels.
 
@@ -321,7 +323,7 @@ def _in_counter_units(
     x, y, z = found.centre
     sigma_x, sigma_y, sigma_z = found.sigma_centre
     enlarged = (z - levels.mean() / units) / c
-    of_lie = enlarged * lie.sigma_shift
+    sigma_placement = enlarged * placement.sigma_shift
     step = float(levels[-1] - levels[0])
     residuals = enlarged * found.residuals
     return PerspectiveCentre(
@@ -329,8 +331,8 @@ def _in_counter_units(
         y,
         z * units,
         (z * units - levels[0]) / step,
-        np.hypot(sigma_x, of_lie),
-        np.hypot(sigma_y, of_lie),
+        np.hypot(sigma_x, sigma_placement),
+        np.hypot(sigma_y, sigma_placement),
         sigma_z * units,
         np.abs(sigma_z * units / step),
         enlarged * found.s0,

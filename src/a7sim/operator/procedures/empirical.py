@@ -114,8 +114,8 @@ def clearing_steps(method: str, model: ModelJob, usable: Sequence[str]) -> tuple
     missing omega is turned at 5, with 3 or 4 missing the rows are exchanged.
     """
     top, base, bottom = (_ends(row, usable) for row in FIGURE_4_1)
-    pair, last = (top, bottom) if _apart(top) else (bottom, top)
-    if base is None or pair is None or last is None or not (_apart(base) and _apart(pair)):
+    pair, last = (top, bottom) if _has_half_a_base(top) else (bottom, top)
+    if base is None or pair is None or last is None or not (_has_half_a_base(base) and _has_half_a_base(pair)):
         return None
     left, right, n = model.left_projector, model.right_projector, model.right_projector
     if method == "dependent":
@@ -140,7 +140,7 @@ def _ends(row: str, usable: Sequence[str]) -> tuple[str, str] | None:
     return (present[0], present[-1]) if present else None
 
 
-def _apart(ends: tuple[str, str] | None) -> bool:
+def _has_half_a_base(ends: tuple[str, str] | None) -> bool:
     """Return whether two points are half a base apart or more."""
     return ends is not None and PLACES[ends[1]][0] - PLACES[ends[0]][0] >= 0.5
 
@@ -183,7 +183,7 @@ def empirical_orientation(
     """
     operators = workstation.operators
     labels = model.points_of_case(case)
-    waiting = _with_pricked(workstation, active, model, labels)
+    waiting = _group_by_missing(workstation, active, model, labels)
     done: list[tuple[Indices, OrientationRecordBatch]] = []
     while waiting:
         missing, group = waiting.popitem()
@@ -197,7 +197,7 @@ def empirical_orientation(
         for lost, label in clearing.lost:
             waiting[missing | {label}] = np.union1d(waiting.get(missing | {label}, lost), lost)
         found = OrientationRecordBatch(method, case, clearing.rounds, clearing.rough, {}, {}, {}, "empirical")
-        done.append((ended, _assessed(workstation, ended, model, found, missing, readings, tolerated_rms)))
+        done.append((ended, _assess_group(workstation, ended, model, found, missing, readings, tolerated_rms)))
     return merge_groups(done, method, case, operators.size, "empirical")
 
 
@@ -206,7 +206,7 @@ def _checks(usable: Sequence[str], steps: Sequence[ClearingStep]) -> list[str]:
     return [label for label in usable if label in CASES["A"] and label not in {step.position for step in steps}]
 
 
-def _assessed(
+def _assess_group(
     workstation: Workstation,
     active: Indices,
     model: ModelJob,
@@ -223,7 +223,7 @@ def _assessed(
     return assess_residuals(workstation, active, model, found, present, readings, tolerated_rms)
 
 
-def _with_pricked(
+def _group_by_missing(
     workstation: Workstation, active: Indices, model: ModelJob, labels: Sequence[str]
 ) -> dict[frozenset[str], Indices]:
     """Return the sessions by the positions that are not in their model, or not pricked on both prints."""
@@ -275,7 +275,7 @@ class _Clearing:
         """Sessions that could not fuse the images, and the position."""
         self._over_corrected = over_corrected
         self._found = {label: np.full(self.operators.size, np.nan) for label in self._labels()}
-        self._places = np.zeros((3, len(steps), self.operators.size))
+        self._positions = np.zeros((3, len(steps), self.operators.size))
         acuity = (
             1e-3 * self.operators.observer.parallax_um * workstation.job.plan.projection_height / workstation.controls.c
         )
@@ -299,8 +299,8 @@ class _Clearing:
                 ended = np.union1d(ended, self._clear_first_four(turning))
                 turning = turning[:0]
             ended = np.union1d(ended, exclude(active, np.flatnonzero(n)))
-            active = self._going(turning)
-        return self._going(ended)
+            active = self._remaining(turning)
+        return self._remaining(ended)
 
     def _labels(self) -> list[str]:
         used = {*(step.position for step in self.steps), *self.checks}
@@ -309,7 +309,7 @@ class _Clearing:
     def _elements(self) -> list[str]:
         return [step.element for step in self.steps]
 
-    def _going(self, active: Indices) -> Indices:
+    def _remaining(self, active: Indices) -> Indices:
         active = self.operators.remaining(np.asarray(active, dtype=np.intp))
         for lost, _ in self.lost:
             active = exclude(active, lost)
@@ -322,14 +322,14 @@ class _Clearing:
         clearing = active
         for _ in range(MAX_PASSES):
             again = clearing[:0]
-            for place, step in enumerate(self.steps[:4]):
-                cleared = self._clear(self._going(clearing), place, step).sessions
+            for index, step in enumerate(self.steps[:4]):
+                cleared = self._clear(self._remaining(clearing), index, step).sessions
                 seen = np.abs(self._found[step.position][cleared])
                 again = np.union1d(again, cleared[seen > VISIBLE_SIGMAS * self._visible])
-            clearing = self._going(again)
+            clearing = self._remaining(again)
             if not clearing.size:
                 break
-        return self._going(active)
+        return self._remaining(active)
 
     def _over_correct(self, active: Indices) -> tuple[Indices, Indices, Array]:
         """Turn omega by n times the clearing turn; return the sessions at the point, those that turned, and n."""
@@ -339,13 +339,13 @@ class _Clearing:
         active, turn = cleared.sessions, cleared.element_change
         turning = active[turn[active] != 0.0]
         if turning.size:
-            n[turning] = self._times(turning)
-            turning = self._going(turning)
+            n[turning] = self._over_correction_factor(turning)
+            turning = self._remaining(turning)
             stands = controls.exact_values(turning, [step.element])[step.element]
             controls.turn_elements(turning, {step.element: stands + ((n - 1.0) * turn)[turning]})
-        return self._going(active), self._going(turning), n
+        return self._remaining(active), self._remaining(turning), n
 
-    def _times(self, active: Indices) -> Array:
+    def _over_correction_factor(self, active: Indices) -> Array:
         """Return the over-correction ``(m,)``: as given, or from the positions of the five points."""
         if not isinstance(self._over_corrected, str):
             return np.full(active.size, float(self._over_corrected))
@@ -361,10 +361,10 @@ class _Clearing:
     def _look_at_checks(self, active: Indices) -> None:
         for label in self.checks:
             seen = self.workstation.look_at_parallaxes(active, [self.model.standard_points[label]])
-            together = self.operators.remaining(active)
-            apart = seen.disagrees(together)
-            self._found[label][together] = seen.parallax_mm[0, together]
-            self._found[label][apart] = np.nan
+            looking = self.operators.remaining(active)
+            unfused = seen.disagrees(looking)
+            self._found[label][looking] = seen.parallax_mm[0, looking]
+            self._found[label][unfused] = np.nan
 
     def _close_round(self, active: Indices, turning: Indices, settings: Mapping[str, Array], n: Array) -> None:
         parallaxes = {label: p.copy() for label, p in self._found.items()}
@@ -375,7 +375,7 @@ class _Clearing:
 
     # --- a point --------------------------------------------------------------------------------------
 
-    def _clear(self, active: Indices, place: int, step: ClearingStep, unless_within: float = 0.0) -> "_ClearingTurn":
+    def _clear(self, active: Indices, index: int, step: ClearingStep, unless_within: float = 0.0) -> "_ClearingTurn":
         """Clear a point, fusing its images first if they are too far apart."""
         point, cleared, parted = self.model.standard_points[step.position], active[:0], active[:0]
         turn = np.zeros(self.operators.size)
@@ -386,14 +386,14 @@ class _Clearing:
                 active, point, step.element, partial(self._gain, step.element), unless_within
             )
             self._found[step.position][done.sessions] = done.arrival_parallax_mm[done.sessions]
-            self._places[:, place, done.sessions] = done.model_position_mm[:, done.sessions]
+            self._positions[:, index, done.sessions] = done.model_position_mm[:, done.sessions]
             turn[done.sessions] = done.element_change[done.sessions]
             cleared = np.union1d(cleared, done.sessions)
             active = exclude(self.operators.remaining(active), done.sessions)
             parted = exclude(active, done.disagreement)
             if tries_left:
                 for session in np.intersect1d(active, done.disagreement):
-                    self._bring_together(np.array([session]), point, step)
+                    self._set_by_each_eye(np.array([session]), point, step)
                 active = self.operators.remaining(active)
         self.operators.give_up(
             self.operators.remaining(parted),
@@ -405,7 +405,7 @@ class _Clearing:
             self.lost.append((active, step.position))
         return _ClearingTurn(self.operators.remaining(np.asarray(cleared, dtype=np.intp)), turn)
 
-    def _bring_together(self, one: Indices, point: str, step: ClearingStep) -> None:
+    def _set_by_each_eye(self, one: Indices, point: str, step: ClearingStep) -> None:
         """Turn an element by the difference of the Y readings of both eyes."""
         workstation, controls, element = self.workstation, self.workstation.controls, step.element
         self.rough[one] += 1
@@ -426,7 +426,7 @@ class _Clearing:
 
     # --- coefficients ---------------------------------------------------------------------------------
 
-    def _by_hand(self, element: str) -> str:
+    def _element_by_side(self, element: str) -> str:
         return f"{element[:-1]}{self.model.side_of(int(element[-1]))}"
 
     def _gain(self, element: str, active: Indices, place: Array) -> Array:
@@ -434,18 +434,18 @@ class _Clearing:
 
         Before the mark follows in height.
         """
-        left, right = self._stands(active)
+        left, right = self._poses(active)
         point = _in_frame(place)
-        row = PARALLAX_ELEMENTS.index(self._by_hand(element))
+        row = PARALLAX_ELEMENTS.index(self._element_by_side(element))
         coefficients = parallax_coefficients(point, point, left.centre, right.centre, left.angles, right.angles)[row]
         return np.asarray(coefficients * (1.0 if element.startswith("b") else GON))
 
     def _coefficients(self, active: Indices) -> Array:
         """Return the coefficients of the five elements at the five points ``(5, 5, m)``, mm per radian or mm per mm."""
-        rows = [PARALLAX_ELEMENTS.index(self._by_hand(name)) for name in self._elements()]
-        return clearing_coefficients(_in_frame(self._places[:, :, active]), *self._stands(active))[rows]
+        rows = [PARALLAX_ELEMENTS.index(self._element_by_side(name)) for name in self._elements()]
+        return clearing_coefficients(_in_frame(self._positions[:, :, active]), *self._poses(active))[rows]
 
-    def _stands(self, active: Indices) -> tuple[ProjectorPose, ProjectorPose]:
+    def _poses(self, active: Indices) -> tuple[ProjectorPose, ProjectorPose]:
         model = self.model
         return (
             projector_pose(self.workstation, active, model.left_projector, np.zeros(active.size)),

@@ -126,17 +126,17 @@ def measure_grid_batch(
         begins(form)
         operators.begin(operators.active, order.plate.name, form)
         workstation.driver.note(operators.active, form)
-        yield _tested(workstation, order, side)
+        yield _test_projector(workstation, order, side)
         workstation.driver.unload(operators.active, side)
 
 
-def _tested(workstation: Workstation, order: GridTestPlan, side: int) -> ProjectorReadings:
+def _test_projector(workstation: Workstation, order: GridTestPlan, side: int) -> ProjectorReadings:
     operators, controls, plate = workstation.operators, workstation.controls, order.plate
     model = ModelJob(f"{plate.name} in projector {side}", plate.name, plate.name, "inside", order.polarity, {})
     certificate = workstation.job.certificate
     _set_to_zeros(workstation, side)
     centre_picture(workstation, operators.active, side, plate.name, certificate)
-    lie = locate_plate(workstation, operators.active, side, certificate, TIMES_REGISTERED)
+    placements = locate_plate(workstation, operators.active, side, certificate, TIMES_REGISTERED)
     workstation.begin(operators.active, model, {side: sketch_positions(workstation, operators.active, side)})
     heights = order.heights(controls.manual)
     sets = np.stack([_pointings(workstation, order, side, height) for height in heights], axis=2)
@@ -144,8 +144,10 @@ def _tested(workstation: Workstation, order: GridTestPlan, side: int) -> Project
     workstation.compute(active)
     counters = _counters(workstation, active, side)
     means = sets.mean(axis=0)[..., active]
-    its_lie = PlatePlacement(*(getattr(lie, field.name)[active] for field in fields(lie)))
-    test = grid_test(cross_positions(order.chosen), means, heights, _elements(controls.manual, counters, side), its_lie)
+    placement = PlatePlacement(*(getattr(placements, field.name)[active] for field in fields(placements)))
+    test = grid_test(
+        cross_positions(order.chosen), means, heights, _elements(controls.manual, counters, side), placement
+    )
     enlarged = -np.array(heights)[:, None, None] / controls.c
     pointing = _repeatability(sets[..., active], enlarged)
     return ProjectorReadings(

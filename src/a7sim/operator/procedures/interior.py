@@ -83,20 +83,22 @@ def centre_picture(
     for round_ in range(1, MAX_ROUNDS + 1):
         names, displacements = view_fiducials(workstation, centring, projector)
         places = np.array([marks[name] for name in names]).T
-        right = _rightly_laid(workstation, centring, projector, photograph, displacements, places)
+        right = _require_near_marks(workstation, centring, projector, photograph, displacements, places)
         centring, displacements = centring[right], displacements[:, :, right]
         try:
-            lie = picture_placement(displacements, places)
+            placement = picture_placement(displacements, places)
         except Undetermined as undetermined:
             operators.give_up(centring, f"the fiducials of {photograph} do not tell how it lies: {undetermined}")
             return found
-        off = np.array([lie.dx, lie.dy]) - wanted
-        is_centred = (np.abs(off).max(axis=0) <= CENTRED_MM) & (np.abs(lie.turn) * np.abs(places).max() <= CENTRED_MM)
+        off = np.array([placement.dx, placement.dy]) - wanted
+        is_centred = (np.abs(off).max(axis=0) <= CENTRED_MM) & (
+            np.abs(placement.turn) * np.abs(places).max() <= CENTRED_MM
+        )
         centred = centring[is_centred]
         found.rounds[centred] = round_
-        found.film_scale[centred] = lie.scale[is_centred]
-        found.residual_mm[centred] = _unexplained(displacements, places, lie)[is_centred]
-        off, turn, centring = off[:, ~is_centred], lie.turn[~is_centred] / GON, centring[~is_centred]
+        found.film_scale[centred] = placement.scale[is_centred]
+        found.residual_mm[centred] = _rms_residual(displacements, places, placement)[is_centred]
+        off, turn, centring = off[:, ~is_centred], placement.turn[~is_centred] / GON, centring[~is_centred]
         if not centring.size:
             break
         now = driver.centring(centring, projector)
@@ -114,10 +116,10 @@ def _mount(workstation: Workstation, active: Indices, projector: int, photograph
     workstation.controls.spend_setting(active)
     workstation.driver.load(active, projector, photograph)
     workstation.controls.give_up_on_errors(active, f"mounting {photograph}")
-    lies_there = workstation.driver.loaded(active, projector)
-    if lies_there != photograph:
+    loaded_picture = workstation.driver.loaded(active, projector)
+    if loaded_picture != photograph:
         operators.give_up(
-            active, f"projector {projector} was to hold {photograph}, but {lies_there or 'nothing'} lies in it"
+            active, f"projector {projector} was to hold {photograph}, but {loaded_picture or 'nothing'} lies in it"
         )
 
 
@@ -131,7 +133,7 @@ def view_fiducials(workstation: Workstation, active: Indices, projector: int) ->
     ]
 
 
-def _rightly_laid(
+def _require_near_marks(
     workstation: Workstation, active: Indices, projector: int, photograph: str, displacements: Array, places: Array
 ) -> npt.NDArray[np.bool_]:
     """Return in which sessions the fiducials are near the collimating marks of their names ``(m,)``.
@@ -151,9 +153,14 @@ def _rightly_laid(
     return np.asarray(~misplaced)
 
 
-def _unexplained(displacements: Array, places: Array, lie: PicturePlacement) -> Array:
+def _rms_residual(displacements: Array, places: Array, placement: PicturePlacement) -> Array:
     x, y = places[:, :, None]
-    explained = np.array([lie.dx - lie.turn * y + lie.scale * x, lie.dy + lie.turn * x + lie.scale * y])
+    explained = np.array(
+        [
+            placement.dx - placement.turn * y + placement.scale * x,
+            placement.dy + placement.turn * x + placement.scale * y,
+        ]
+    )
     return np.asarray(np.sqrt(((displacements - explained) ** 2).mean(axis=(0, 1))))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from a7sim.batch import Indices
 from a7sim.geometry import Array
+from a7sim.operator.driving.controls import side_name
 from a7sim.operator.driving.fittings import required_fittings
 from a7sim.operator.driving.job import Job, ModelJob
 from a7sim.operator.driving.scpi_driver import ScpiDriver
@@ -62,12 +63,12 @@ class ModelRecordBatch:
     """By session, if models are levelled and scaled at the instrument; sessions without enough control have none."""
 
     @cached_property
-    def _points_listed(self) -> dict[str, list[list[float]]]:
+    def _point_lists(self) -> dict[str, list[list[float]]]:
         return {point: each.T.tolist() for point, each in self.points.items()}
 
     def for_session(self, session: int) -> ModelRecord:
         """Return the record of one session."""
-        places = {point: each[session] for point, each in self._points_listed.items()}
+        places = {point: each[session] for point, each in self._point_lists.items()}
         return ModelRecord(
             self.model,
             {name: each.for_session(session) for name, each in self.interior.items()},
@@ -103,12 +104,12 @@ def measure_models_batch(
 ) -> Iterator[ModelRecordBatch]:
     """Yield the models of a job measured by a batch of operators."""
     try:
-        yield from _worked(workstation, begins)
+        yield from _measure_each_model(workstation, begins)
     except AllGaveUpError:
         return
 
 
-def _worked(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[ModelRecordBatch]:
+def _measure_each_model(workstation: Workstation, begins: Callable[[str], None]) -> Iterator[ModelRecordBatch]:
     job, operators = workstation.job, workstation.operators
     interior: dict[str, InteriorOrientationBatch] = {}
     workstation.controls.prepare(operators.active)
@@ -126,9 +127,9 @@ def _worked(workstation: Workstation, begins: Callable[[str], None]) -> Iterator
         begin_form(workstation, model, "model coordinates", begins)
         points = model_coordinates(workstation, model)
         centres = {}
-        for hand, side in ((1, "left"), (2, "right")):
-            begin_form(workstation, model, f"{side} perspective centre", begins)
-            centres[hand] = observe_centre(workstation, operators.active, model, hand)
+        for side in (1, 2):
+            begin_form(workstation, model, f"{side_name(side)} perspective centre", begins)
+            centres[side] = observe_centre(workstation, operators.active, model, side)
         on_ground = None
         if job.control:
             begin_form(workstation, model, "absolute orientation", begins)

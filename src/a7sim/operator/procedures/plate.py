@@ -62,23 +62,25 @@ def point_at_crosses(workstation: Workstation, active: Indices, side: int, cross
     """
     operators = workstation.operators
     names = list(crosses)
-    _go_below(workstation, active, side)
+    _drive_below_centre(workstation, active, side)
     readings = workstation.point_monocularly(active, side, names, level)
     looking = operators.remaining(active)
     for _ in range(MAX_REPETITIONS):
         misread = (
-            _misread(readings[:, :, looking], cross_positions(crosses)) if looking.size else np.zeros(0, dtype=np.intp)
+            _find_misread(readings[:, :, looking], cross_positions(crosses))
+            if looking.size
+            else np.zeros(0, dtype=np.intp)
         )
         looking, misread = looking[misread >= 0], misread[misread >= 0]
-        for place in np.unique(misread):
-            again = looking[misread == place]
+        for index in np.unique(misread):
+            again = looking[misread == index]
             why = "does not agree with the other crosses of the plate"
-            readings[:, place, again] = workstation.repeat_pointing(again, side, names[place], level, why)[:, again]
+            readings[:, index, again] = workstation.repeat_pointing(again, side, names[index], level, why)[:, again]
         looking = operators.remaining(looking)
     return readings
 
 
-def _go_below(workstation: Workstation, active: Indices, side: int) -> None:
+def _drive_below_centre(workstation: Workstation, active: Indices, side: int) -> None:
     """Drive the mark vertically below a centre, from where all levels are reachable.
 
     From the side the rods may not be.
@@ -87,7 +89,7 @@ def _go_below(workstation: Workstation, active: Indices, side: int) -> None:
     workstation.controls.drive(active, {"X": x, "Y": y})
 
 
-def _misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:
+def _find_misread(readings: Array, crosses: Array) -> npt.NDArray[np.intp]:
     """Return the index ``(m,)`` of the cross that contradicts the others, -1 for none.
 
     The plate is fitted by a projective plane, because a tilted plane is seen in perspective.

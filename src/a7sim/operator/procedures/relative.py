@@ -73,11 +73,11 @@ class RoundBatch(Round[Array]):
     def for_session(self, session: int) -> Round[float]:
         """Return the round of one session."""
         return Round(
-            _picked(self.settings, session),
-            _present(_picked(self.parallaxes, session)),
+            _values_of(self.settings, session),
+            _without_nan(_values_of(self.parallaxes, session)),
             float(self.mean[session]),
             float(self.rms[session]),
-            _picked(self.sigmas, session) if session in self.corrected else {},
+            _values_of(self.sigmas, session) if session in self.corrected else {},
             float(self.over_correction[session]),
         )
 
@@ -123,8 +123,8 @@ class OrientationRecordBatch:
         return np.asarray(np.sqrt(np.nansum(squares, axis=0) / np.maximum(1, (~np.isnan(squares)).sum(axis=0))))
 
     @cached_property
-    def _listed(self) -> "_Listed":
-        return _Listed(
+    def _lists(self) -> "_OrientationLists":
+        return _OrientationLists(
             {name: each.tolist() for name, each in self.elements.items()},
             {label: each.tolist() for label, each in self.residuals.items()},
             {label: list(zip(*each.tolist(), strict=True)) for label, each in self.places.items()},
@@ -132,14 +132,14 @@ class OrientationRecordBatch:
 
     def for_session(self, session: int) -> OrientationRecord:
         """Return the orientation of one session."""
-        listed = self._listed
-        residuals = _present(_picked(listed.residuals, session))
+        listed = self._lists
+        residuals = _without_nan(_values_of(listed.residuals, session))
         return OrientationRecord(
             self.method,
             self.case,
             [each.for_session(session) for each in self.rounds if session in each.sessions],
             int(self.rough_rounds[session]),
-            _picked(listed.elements, session),
+            _values_of(listed.elements, session),
             residuals,
             {label: places[session] for label, places in listed.places.items() if label in residuals},
             self.procedure,
@@ -147,7 +147,7 @@ class OrientationRecordBatch:
 
 
 @dataclass(frozen=True)
-class _Listed:
+class _OrientationLists:
     """Residuals at standard points and counter readings as lists by session, which are faster to index."""
 
     elements: Mapping[str, Sequence[float]]
@@ -155,11 +155,11 @@ class _Listed:
     places: Mapping[str, Sequence[tuple[float, float, float]]]
 
 
-def _picked(values: Mapping[str, Array | Sequence[float]], session: int) -> dict[str, float]:
+def _values_of(values: Mapping[str, Array | Sequence[float]], session: int) -> dict[str, float]:
     return {name: float(each[session]) for name, each in values.items()}
 
 
-def _present(values: Mapping[str, float]) -> dict[str, float]:
+def _without_nan(values: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if not math.isnan(value)}
 
 
@@ -205,7 +205,7 @@ def relative_orientation(
         present = [positions[point] for point in points]
         labels = [label for label in present if label in CASES[case]]
         if determine_orientation(labels):
-            found = _oriented(workstation, group, model, method, case, labels, readings, base)
+            found = _orient_in_rounds(workstation, group, model, method, case, labels, readings, base)
             done.append(
                 (
                     group,
@@ -226,7 +226,7 @@ def _too_few(model: ModelJob, case: str, labels: Sequence[str]) -> str:
     )
 
 
-def _oriented(
+def _orient_in_rounds(
     workstation: Workstation,
     active: Indices,
     model: ModelJob,
@@ -243,21 +243,21 @@ def _oriented(
     points = [model.standard_points[label] for label in labels]
     rounds: list[RoundBatch] = []
     done, rough_rounds = np.zeros((2, operators.size), dtype=np.intp)
-    best = _Best(unknowns, operators.size)
+    best = _BestSettings(unknowns, operators.size)
     measuring = active
     while measuring.size:
         settings = expand_to_batch(controls.elements(measuring, unknowns), measuring, operators.size)
         workstation.begin_round(measuring, int(done[measuring].max()) + 1)
         seen = workstation.parallaxes(measuring, points, readings, measured_with)
         measuring = operators.remaining(measuring)
-        apart = seen.disagrees(measuring)
-        together = exclude(measuring, apart)
-        rough_rounds[apart] += 1
-        _bring_together(workstation, apart, model, points, unknowns, base, seen.disagreement, rough_rounds)
-        done[together] += 1
-        mean, rms = _mean_and_rms(seen.parallax_mm, together)
-        falling = together[rms[together] < STILL_FALLING * best.rms[together]]
-        best.see(together, settings, mean, rms)
+        unfused = seen.disagrees(measuring)
+        fused = exclude(measuring, unfused)
+        rough_rounds[unfused] += 1
+        _orient_roughly(workstation, unfused, model, points, unknowns, base, seen.disagreement, rough_rounds)
+        done[fused] += 1
+        mean, rms = _mean_and_rms(seen.parallax_mm, fused)
+        falling = fused[rms[fused] < STILL_FALLING * best.rms[fused]]
+        best.keep_better(fused, settings, mean, rms)
         to_clear = seen.parallax_mm - mean if method == "independent" else seen.parallax_mm
         corrections, sigmas = compute_corrections(
             workstation, falling, model, seen.places, to_clear, unknowns, np.full(falling.size, base), labels
@@ -271,14 +271,14 @@ def _oriented(
                 rms,
                 sigmas,
                 np.zeros(operators.size),
-                together,
+                fused,
                 falling,
             )
         )
         if falling.size:
             noted = operators.noted_elements(falling, settings, rounds[-2].settings if len(rounds) > 1 else {})
             controls.set_elements(falling, {n: (noted[n] + corrections[n])[falling] for n in unknowns})
-        measuring = operators.remaining(np.sort(np.concatenate([falling, apart])))
+        measuring = operators.remaining(np.sort(np.concatenate([falling, unfused])))
         measuring = measuring[done[measuring] < MAX_ROUNDS]
     active = operators.remaining(active)
     controls.set_if_changed(active, {name: kept[active] for name, kept in best.settings.items()})
@@ -308,7 +308,7 @@ def merge_groups(
     )
 
 
-class _Best:
+class _BestSettings:
     """Best settings so far of each session."""
 
     def __init__(self, unknowns: Sequence[str], sessions: int) -> None:
@@ -316,7 +316,7 @@ class _Best:
         self.mean = np.zeros(sessions)
         self.rms = np.full(sessions, np.inf)
 
-    def see(self, active: Indices, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
+    def keep_better(self, active: Indices, settings: Mapping[str, Array], mean: Array, rms: Array) -> None:
         """Keep the settings where the rms is smaller than before."""
         better = active[rms[active] < self.rms[active]]
         self.mean[better], self.rms[better] = mean[better], rms[better]
@@ -346,28 +346,28 @@ def assess_residuals(
     operators = workstation.operators
     names = [model.standard_points[label] for label in labels]
     measured = workstation.controls.has_parallax_elements
-    left = (
+    seen = (
         workstation.parallaxes(active, names, readings) if measured else workstation.look_at_parallaxes(active, names)
     )
     active = operators.remaining(active)
-    apart = left.disagrees(active)
+    unfused = seen.disagrees(active)
     operators.give_up(
-        apart, lambda session: f"{model.name}: the images of {left.disagreement[session]} cannot be fused any more"
+        unfused, lambda session: f"{model.name}: the images of {seen.disagreement[session]} cannot be fused any more"
     )
     active = operators.remaining(active)
     present = [name for name in ALL_ELEMENTS if name in workstation.controls.manual.elements]
     orientations = replace(
         found,
         elements=expand_to_batch(workstation.controls.elements(active, present), active, operators.size),
-        residuals=dict(zip(labels, left.parallax_mm, strict=True)),
-        places=dict(zip(labels, np.moveaxis(left.places, 1, 0), strict=True)),
+        residuals=dict(zip(labels, seen.parallax_mm, strict=True)),
+        places=dict(zip(labels, np.moveaxis(seen.places, 1, 0), strict=True)),
     )
-    rms, worst = orientations.rms, np.abs(left.parallax_mm).argmax(axis=0)
+    rms, worst = orientations.rms, np.abs(seen.parallax_mm).argmax(axis=0)
     operators.give_up(
         active[rms[active] > tolerated_rms],
         lambda session: (
             f"{model.name}: y-parallaxes of {rms[session]:.3f} mm rms remain, {tolerated_rms:.3f} tolerated; the "
-            f"largest is {left.parallax_mm[worst[session], session]:+.3f} at point {names[worst[session]]}: "
+            f"largest is {seen.parallax_mm[worst[session], session]:+.3f} at point {names[worst[session]]}: "
             "a point is mistaken, "
             "or the photographs do not belong together"
         ),
@@ -391,27 +391,28 @@ def _set_mean_on_by(workstation: Workstation, active: Indices, model: ModelJob, 
         )
 
 
-def _bring_together(
+def _orient_roughly(
     workstation: Workstation,
     active: Indices,
     model: ModelJob,
     points: Sequence[str],
     unknowns: Sequence[str],
     base: float,
-    apart: npt.NDArray[np.object_],
+    disagreement: npt.NDArray[np.object_],
     rough_rounds: npt.NDArray[np.intp],
 ) -> None:
     """Orient roughly, where images are too far apart for by, from the Y readings of each eye."""
     operators, controls = workstation.operators, workstation.controls
     operators.give_up(
         active[rough_rounds[active] > MAX_ROUGH_ROUNDS],
-        lambda session: f"{model.name}: the images of {apart[session]} stay too far apart to be fused",
+        lambda session: f"{model.name}: the images of {disagreement[session]} stay too far apart to be fused",
     )
     for session in operators.remaining(active):
         one = np.array([session])
         operators.remark(
             one,
-            f"{model.name}: the images of {apart[session]} are too far apart for by: rough orientation, each eye alone",
+            f"{model.name}: the images of {disagreement[session]} are too far apart for by: "
+            "rough orientation, each eye alone",
         )
         level = float(controls.counters(one)[2, 0])
         readings = [workstation.point_monocularly(one, side, points, level) for side in (1, 2)]
@@ -446,13 +447,13 @@ def compute_corrections(
     nothing = {name: np.zeros(workstation.operators.size) for name in unknowns}
     if not active.size:
         return nothing, nothing
-    hands = [f"{name[:-1]}{model.side_of(int(name[-1]))}" for name in unknowns]
+    elements_by_side = [f"{name[:-1]}{model.side_of(int(name[-1]))}" for name in unknowns]
     left = projector_pose(workstation, active, model.left_projector, np.zeros(active.size))
     right = projector_pose(workstation, active, model.right_projector, base)
     workstation.compute(active)
     in_frame = places[:, :, active] * np.array([1.0, 1.0, -1.0])[:, None, None]
     try:
-        solution = element_corrections(parallaxes[:, active], in_frame, left, right, hands)
+        solution = element_corrections(parallaxes[:, active], in_frame, left, right, elements_by_side)
     except Undetermined as undetermined:
         workstation.operators.give_up(active, f"{model.name}: {undetermined}")
         return nothing, nothing
@@ -462,7 +463,7 @@ def compute_corrections(
         on_pattern = _on_pattern(workstation, active, labels, places[:, :, active], base)
         if on_pattern.any():
             b, d, h = _pattern(places[:, :, active[on_pattern]], base[on_pattern])
-            found[:, :, on_pattern] = regular_corrections(parallaxes[:, active[on_pattern]], b, d, h, hands)
+            found[:, :, on_pattern] = regular_corrections(parallaxes[:, active[on_pattern]], b, d, h, elements_by_side)
     values, sigmas = (
         expand_to_batch(dict(zip(unknowns, factors * each, strict=True)), active, workstation.operators.size)
         for each in found
