@@ -157,9 +157,9 @@ def echoes(stack, kind):
 
 
 def instrument(stack, link):
-    process, doors = stack.enter_context(processes.a7sim("--tcp", "127.0.0.1:0", "--pty", str(link)))
-    processes.standing_at(doors["tcp"]["port"])
-    return process, doors
+    process, endpoints = stack.enter_context(processes.a7sim("--tcp", "127.0.0.1:0", "--pty", str(link)))
+    processes.standing_at(endpoints["tcp"]["port"])
+    return process, endpoints
 
 
 def lewis(stack, python, delay):
@@ -232,7 +232,7 @@ def main():
     environments = Environments(chosen.peers)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        device, doors = instrument(stack, folder / "a7sim")
+        device, endpoints = instrument(stack, folder / "a7sim")
         sinstruments = None
         python = environments.python(SINSTRUMENTS)
         if python:
@@ -244,7 +244,7 @@ def main():
                 "TCP, bare socket",
                 [*LEWIS, SINSTRUMENTS],
                 TARGET,
-                tcp(stack, environments, device, doors["tcp"]["port"], sinstruments),
+                tcp(stack, environments, device, endpoints["tcp"]["port"], sinstruments),
             ),
             (
                 "pseudo-terminal, pyserial",
