@@ -78,8 +78,8 @@ def main():
     parser.add_argument("--clients", type=int, default=100)
     parser.add_argument("--seconds", type=float, default=30.0)
     chosen = parser.parse_args()
-    with processes.a7sim("--tcp", "127.0.0.1:0", "--clients", str(chosen.clients)) as (_, doors):
-        port = doors["tcp"]["port"]
+    with processes.a7sim("--tcp", "127.0.0.1:0", "--clients", str(chosen.clients)) as (_, endpoints):
+        port = endpoints["tcp"]["port"]
         processes.standing_at(port)
         pollers = asyncio.run(polled(port, chosen.clients, chosen.seconds))
     answers = sorted(poller.answers for poller in pollers)

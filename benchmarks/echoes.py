@@ -1,6 +1,6 @@
-"""Servers that say again what they hear, the floor of benchmarks/links.py: `python echoes.py threads|asyncio|pty`.
+"""Servers that return their input, the floor of benchmarks/links.py: `python echoes.py threads|asyncio|pty`.
 
-Each prints where it is to be reached, a port or a device.
+Each prints its port or device.
 """
 
 import asyncio

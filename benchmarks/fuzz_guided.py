@@ -1,9 +1,9 @@
-"""Let atheris look for lines that reach what no line has reached, and see that the promises hold for them.
+"""Search with atheris for lines that reach new code, and check the rules of the language for them.
 
     pip install atheris
     python benchmarks/fuzz_guided.py -max_total_time=60 -seed=1     # options of libFuzzer
 
-The checks are those of fuzz_language.py. Stops at the first line that breaks a promise.
+The checks are those of fuzz_language.py. Stops at the first line that breaks a rule.
 """
 
 import os
@@ -17,7 +17,7 @@ with atheris.instrument_imports(include=["a7sim.instrument.language"]):
 
 
 def listener(numbers):
-    """Return a function that hears bytes as lines, on a new instrument now and then."""
+    """Return a function that feeds bytes as lines, with a new instrument at intervals."""
     instruments = fuzz_language.instruments(1)
     fuzzed = []
 
@@ -38,7 +38,7 @@ def guided():
 
 
 def main():
-    """Fuzz in a process of its own, since atheris ends the one it is in."""
+    """Fuzz in a separate process, because atheris ends its process."""
     process = os.fork()
     if process == 0:
         guided()

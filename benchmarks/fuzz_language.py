@@ -1,11 +1,11 @@
-"""Throw random and mutated lines at the command language and see that its promises hold.
+"""Send random and mutated lines to the command language and check its rules.
 
     python benchmarks/fuzz_language.py --lines 1000000 --seed 1
     python benchmarks/fuzz_guided.py -max_total_time=60     # guided by coverage; needs `pip install atheris`
 
 After every line: nothing was raised; a command had no reply; a query had one reply or one error; the reply is one
 whole line of printable ASCII and blocks; the error queue, the event bits and the status byte agree with what was
-reported. Stops at the first line that breaks a promise and prints it, exit code 1.
+reported. Stops at the first line that breaks a rule and prints it, exit code 1.
 """
 
 import argparse
@@ -30,7 +30,7 @@ from a7sim.scenario import load_scenario
 from a7sim.scene import build_scene
 
 ASKED_OF = 1_000_000
-"""Lines after which no promise may be broken."""
+"""Number of lines of the target."""
 
 LINES_AN_INSTRUMENT = 500
 """Lines per instrument."""
@@ -56,7 +56,7 @@ _QUOTED = re.compile(r""""[^"]*("|$)|'[^']*('|$)""")
 
 
 class Broken(AssertionError):
-    """Line that broke a promise."""
+    """Line that broke a rule."""
 
 
 @contextmanager

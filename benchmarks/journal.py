@@ -1,4 +1,4 @@
-"""What the journal costs, as a share of the time of the same session without it, and how quickly it is sought in.
+"""Time the journal as a share of the same session without it, and time seeking in a long journal.
 
 Session and session with journal take turns, so that both meet the same machine; the quickest of each are compared,
 because other work can only make them slower.
@@ -117,7 +117,7 @@ def main():
     parser.add_argument("--events", type=int, default=ASKED_OF)
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
-        return cost(Path(temporary), chosen.repeated_parameter) + seeking(Path(temporary), chosen.events)
+        return cost(Path(temporary), chosen.repeats) + seeking(Path(temporary), chosen.events)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Kill sessions with SIGKILL at seeded random moments, resume them, and see that nothing is lost.
+"""Kill sessions with SIGKILL at seeded random moments, resume them, and check that nothing is lost.
 
 Half are runs of the operator, whose folder must then hold, byte for byte, what an uninterrupted run leaves. Half are
 servers with two clients, where every registration that was acknowledged must be there after resuming, and where the
@@ -31,7 +31,7 @@ STEPS = 150
 
 
 class Forked:
-    """A command in a process of its own, which needs no time to start; what it prints comes through a pipe."""
+    """Command in a forked process, with its standard output as a pipe."""
 
     def __init__(self, command, *arguments):
         read, write = os.pipe()
@@ -83,7 +83,7 @@ def killed_run(folder, whole, took, dice):
 
 
 class Clerk:
-    """A client who sets an element, registers it, and asks whether that has been done, again and again."""
+    """Client that repeatedly sets an element, registers it and queries the number of registrations."""
 
     def __init__(self, number, port, step):
         self._number = number
@@ -109,12 +109,12 @@ def registered(folder):
     return found
 
 
-def worked(port, begun, dice, until=STEPS):
-    """Let two clients work in a random order, as far as the server lives; return how far each got acknowledged."""
+def work_both(port, steps, dice, until=STEPS):
+    """Run two clients in a random order until the server ends; return the acknowledged steps of each."""
     try:
-        clerks = [Clerk(number, port, begun[number]) for number in (1, 2)]
+        clerks = [Clerk(number, port, steps[number]) for number in (1, 2)]
     except ConnectionError:
-        return begun
+        return steps
     try:
         while any(clerk.step < until for clerk in clerks):
             dice.choice([clerk for clerk in clerks if clerk.step < until]).work()
@@ -129,7 +129,7 @@ def killed_server(folder, whole, took, dice):
     port = process.port()
     signal.signal(signal.SIGALRM, lambda *_: os.kill(process.pid, signal.SIGKILL))
     signal.setitimer(signal.ITIMER_REAL, dice.uniform(0.02, 1.0) * took)
-    acknowledged = worked(port, {1: 0, 2: 0}, dice)
+    acknowledged = work_both(port, {1: 0, 2: 0}, dice)
     process.wait()
     process = Forked(serve, "--resume", folder, "--tcp", "127.0.0.1:0", "--json")
     port = process.port()
@@ -138,7 +138,7 @@ def killed_server(folder, whole, took, dice):
         recorded,
         acknowledged,
     )
-    worked(port, recorded, dice)
+    work_both(port, recorded, dice)
     assert process.kill(signal.SIGTERM) == 0
     assert registered(folder) == whole, folder
     return sum(acknowledged.values()) / (2 * STEPS)
@@ -153,7 +153,7 @@ def timed(work):
 def served_whole(folder):
     process = Forked(serve, "akwanga", "--tcp", "127.0.0.1:0", "--json", "--out", folder)
     port = process.port()
-    _, took = timed(lambda: worked(port, {1: 0, 2: 0}, random.Random(0)))
+    _, took = timed(lambda: work_both(port, {1: 0, 2: 0}, random.Random(0)))
     process.kill(signal.SIGTERM)
     return registered(folder), took
 

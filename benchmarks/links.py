@@ -6,8 +6,8 @@
 In three groups (TCP by a bare socket, a pseudo-terminal by pyserial, VISA in process) the same client asks all in
 turn, a short batch each, round after round, and all answer eight bytes. A ratio is the median over the rounds of the
 rate to that of the group's floor in the same round. Client and servers share one processor, since what waking another
-costs depends on where a scheduler happened to put them; servers are stopped while another is asked. A peer that is not
-there is said so and left out.
+costs depends on where a scheduler happened to put them; servers are stopped while another is asked. A missing
+peer is reported and omitted.
 """
 
 import argparse
@@ -43,7 +43,7 @@ LEWIS = {"lewis==1.3.5": 0.1, "lewis==1.4.0": 0}
 
 @dataclass
 class Contender:
-    """Who is asked, and how long the answers took."""
+    """Server with its query function and the times of its answers, s."""
 
     name: str
     batch: object
@@ -51,7 +51,7 @@ class Contender:
     rounds: list = field(default_factory=list)
 
     def asked(self, seconds):
-        """Ask for about so long, after some questions that show how many that are."""
+        """Query for about `seconds`; a few first queries determine the number."""
         with self._awake():
             first = self.batch(FEW)
             self.rounds.append(self.batch(max(FEW, int(seconds * FEW / sum(first)))))
@@ -119,7 +119,7 @@ class Environments:
         self._folder = folder
 
     def python(self, requirement):
-        """The interpreter with a peer, or None with a line that says why there is none."""
+        """Return the interpreter with a peer, None with a printed reason if it is missing."""
         if self._folder is None:
             print(f"{requirement}: left out; --peers DIR says where it is, or is to be made")
             return None
@@ -144,7 +144,7 @@ def ask_batches(ask):
 
 
 def answering(name, ask, process):
-    """A contender, if it answers as the others do."""
+    """Return a contender. Raises ValueError unless it answers eight bytes."""
     heard = ask()
     if len(heard) != 8:
         raise ValueError(f"{name}: expected an answer of eight bytes, got {heard!r}")
@@ -157,9 +157,9 @@ def echoes(stack, kind):
 
 
 def instrument(stack, link):
-    process, doors = stack.enter_context(processes.a7sim("--tcp", "127.0.0.1:0", "--pty", str(link)))
-    processes.standing_at(doors["tcp"]["port"])
-    return process, doors
+    process, endpoints = stack.enter_context(processes.a7sim("--tcp", "127.0.0.1:0", "--pty", str(link)))
+    processes.standing_at(endpoints["tcp"]["port"])
+    return process, endpoints
 
 
 def lewis(stack, python, delay):
@@ -232,7 +232,7 @@ def main():
     environments = Environments(chosen.peers)
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        device, doors = instrument(stack, folder / "a7sim")
+        device, endpoints = instrument(stack, folder / "a7sim")
         sinstruments = None
         python = environments.python(SINSTRUMENTS)
         if python:
@@ -244,7 +244,7 @@ def main():
                 "TCP, bare socket",
                 [*LEWIS, SINSTRUMENTS],
                 TARGET,
-                tcp(stack, environments, device, doors["tcp"]["port"], sinstruments),
+                tcp(stack, environments, device, endpoints["tcp"]["port"], sinstruments),
             ),
             (
                 "pseudo-terminal, pyserial",

@@ -1,14 +1,14 @@
-"""Change the source in small ways, one at a time, and see whether a test notices (mutation testing).
+"""Change the source in small ways, one at a time, and check whether a test fails (mutation testing).
 
     pip install mutmut==3.8.1
     python benchmarks/mutants.py [--seed 1985] [--again NAME...]
 
-Mutmut writes every mutant of geometry, reductions and language engine into `mutants/`, works a sample of them against
-the test files that `[tool.mutmut]` of pyproject.toml names, and keeps what came of each. It loads the source before it
-chooses the mutant, so that one in the making of the command table is never met; and it asks few files. So each mutant
-that it leaves is given a second look: a process of its own, that loads the source as mutated, and all the files of its
-room. What is printed last are the shares; what survives is to be read one by one (docs/mutants.md). `--again` gives
-the second look to mutants that are named, with no first one.
+Mutmut writes every mutant of geometry, reductions and language engine into `mutants/`, runs a sample of them against
+the test files that `[tool.mutmut]` of pyproject.toml names, and stores the results. It loads the source before it
+selects the mutant, so that a mutant of the construction of the command table has no effect; and it runs few files.
+Therefore each mutant that survives runs a second time, in a separate process that loads the mutated source, against
+all test files of its part. The last output are the shares of killed mutants; survivors are listed in docs/mutants.md.
+`--again` runs only the second run, for named mutants.
 """
 
 import json
@@ -25,35 +25,35 @@ import click
 
 SEED = 1985
 MUTANTS = Path("mutants")
-MAX_LOOK = 600
-"""Seconds; a mutant that takes longer has been noticed."""
+MAX_RUN_S = 600
+"""Time limit of the second run in s; a mutant that exceeds it is killed."""
 
 SURVIVED, NO_TEST = 0, 33
-"""Mutmut's exit codes of what it leaves."""
+"""Mutmut's exit codes of survivors."""
 
-SOME = "a7sim.geometry._rotation.x_dots*"
-"""A few mutants that are worked only because mutmut writes all of them before it works any."""
+FIRST_MUTANTS = "a7sim.geometry._rotation.x_dots*"
+"""A few mutants, run only because mutmut writes all mutants before the first run."""
 
 
 @dataclass(frozen=True)
-class Room:
-    """A part of the source, how many of its mutants are drawn, and the tests of the second look, quick ones first."""
+class SourcePart:
+    """Part of the source, its sample size, and the test files of the second run, quick ones first."""
 
     name: str
     package: str
-    drawn: int
+    sample_size: int
     tests: tuple[str, ...]
 
 
-ROOMS = (
-    Room("geometry", "a7sim.geometry.", 60, ("geometry", "relative_orientation", "instrument")),
-    Room(
+SOURCE_PARTS = (
+    SourcePart("geometry", "a7sim.geometry.", 60, ("geometry", "relative_orientation", "instrument")),
+    SourcePart(
         "reductions",
         "a7sim.reduction.",
         110,
         ("strips", "relative_orientation", "reduction", "cards", "reduce_strips", "grid_test", "operator", "empirical"),
     ),
-    Room(
+    SourcePart(
         "language",
         "a7sim.instrument.language.",
         90,
@@ -62,39 +62,39 @@ ROOMS = (
 )
 
 
-def room_of(name: str) -> Room:
-    """Return the room of a mutant."""
-    return next(room for room in ROOMS if name.startswith(room.package))
+def part_of(name: str) -> SourcePart:
+    """Return the part of the source of a mutant."""
+    return next(part for part in SOURCE_PARTS if name.startswith(part.package))
 
 
-def sampled(names: list[str], seed: int) -> list[str]:
-    """Return the sample of a seed, room by room."""
+def draw_sample(names: list[str], seed: int) -> list[str]:
+    """Return the sample of a seed, part by part."""
     draw = random.Random(seed)
     in_order = sorted(names)
     return [
         name
-        for room in ROOMS
-        for name in draw.sample([each for each in in_order if each.startswith(room.package)], room.drawn)
+        for part in SOURCE_PARTS
+        for name in draw.sample([each for each in in_order if each.startswith(part.package)], part.sample_size)
     ]
 
 
 def exit_codes() -> dict[str, int | None]:
-    """Return the results of mutmut's first run by mutant; None where it has not run."""
+    """Return the results of mutmut's first run by mutant; None if it has not run."""
     found: dict[str, int | None] = {}
     for path in MUTANTS.rglob("*.meta"):
         found |= json.loads(path.read_text(encoding="utf-8"))["exit_code_by_key"]
     return found
 
 
-def noticed_by(name: str) -> str:
-    """Return the test that fails under a mutant, '' where none does."""
-    tests = [f"tests/test_{each}.py" for each in room_of(name).tests]
+def failing_test(name: str) -> str:
+    """Return the test that fails with a mutant, '' without one."""
+    tests = [f"tests/test_{each}.py" for each in part_of(name).tests]
     environment = os.environ | {"MUTANT_UNDER_TEST": name, "PYTHONPATH": str(MUTANTS.resolve() / "src")}
     options = ["-q", "-x", "--tb=no", "-m", "not slow", "-p", "no:cacheprovider", "-p", "no:xdist"]
     command = [sys.executable, "-m", "pytest", *options, *tests]
     try:
         done = subprocess.run(
-            command, cwd=MUTANTS, env=environment, capture_output=True, text=True, timeout=MAX_LOOK, check=False
+            command, cwd=MUTANTS, env=environment, capture_output=True, text=True, timeout=MAX_RUN_S, check=False
         )
     except subprocess.TimeoutExpired:
         return "time out"
@@ -104,11 +104,11 @@ def noticed_by(name: str) -> str:
     return failed[1] if failed else "nothing could be loaded"
 
 
-def looked_at_again(names: list[str]) -> list[str]:
-    """Give mutants the second look; return those that nothing notices."""
+def run_again(names: list[str]) -> list[str]:
+    """Run mutants a second time; return the survivors."""
     survivors = []
     for name in names:
-        test = noticed_by(name)
+        test = failing_test(name)
         click.echo(f"{name}: {test or 'SURVIVED'}")
         if not test:
             survivors.append(name)
@@ -121,26 +121,26 @@ def mutmut(*arguments: str) -> None:
 
 
 @click.command(help=__doc__.partition("\n")[0])
-@click.option("--seed", default=SEED, show_default=True, help="Which mutants are drawn.")
-@click.option("--again", multiple=True, metavar="NAME", help="Give this mutant the second look only.")
+@click.option("--seed", default=SEED, show_default=True, help="Seed of the sample.")
+@click.option("--again", multiple=True, metavar="NAME", help="Run this mutant a second time only.")
 def main(seed: int, again: tuple[str, ...]) -> None:
-    """Draw, work and judge mutants."""
+    """Draw and run mutants, and print the shares of killed ones."""
     if again:
-        looked_at_again(list(again))
+        run_again(list(again))
         return
-    mutmut(SOME)
-    names = sampled(list(exit_codes()), seed)
+    mutmut(FIRST_MUTANTS)
+    names = draw_sample(list(exit_codes()), seed)
     mutmut(*names)
     codes = exit_codes()
-    open_ = [name for name in names if codes[name] in (None, SURVIVED, NO_TEST)]
-    first, drawn = Counter(room_of(name).name for name in open_), Counter(room_of(name).name for name in names)
-    second = Counter(room_of(name).name for name in looked_at_again(open_))
-    for room in drawn:
+    survivors = [name for name in names if codes[name] in (None, SURVIVED, NO_TEST)]
+    first, drawn = Counter(part_of(name).name for name in survivors), Counter(part_of(name).name for name in names)
+    second = Counter(part_of(name).name for name in run_again(survivors))
+    for part in drawn:
         click.echo(
-            f"{room}: {drawn[room]} drawn, {drawn[room] - first[room]} killed at the first look, "
-            f"{drawn[room] - second[room]} at both ({1 - second[room] / drawn[room]:.1%})"
+            f"{part}: {drawn[part]} drawn, {drawn[part] - first[part]} killed in the first run, "
+            f"{drawn[part] - second[part]} in both ({1 - second[part] / drawn[part]:.1%})"
         )
-    click.echo(f"all: {1 - second.total() / drawn.total():.1%} killed, survivors not yet told from equal ones")
+    click.echo(f"all: {1 - second.total() / drawn.total():.1%} killed, equivalent mutants among the survivors included")
 
 
 if __name__ == "__main__":

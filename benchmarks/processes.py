@@ -31,7 +31,7 @@ def a7sim(*options):
             document += line
             if line == "}\n":
                 break
-        yield process, {door["kind"]: door for door in json.loads(document)["listening"]}
+        yield process, {endpoint["kind"]: endpoint for endpoint in json.loads(document)["listening"]}
 
 
 def standing_at(port, reading=-123.45):

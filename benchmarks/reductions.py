@@ -1,6 +1,6 @@
 """Time reductions, on one thread and with their accuracy beside them, against programs that do the same.
 
-The peers are in benchmarks/requirements-peers.txt; one that is not installed is said so and left out. Every
+The peers are in benchmarks/requirements-peers.txt; one that is not installed is reported and omitted. Every
 benchmark is a function in `BENCHMARKS`; name some on the command line to run those alone.
 """
 

@@ -1,4 +1,4 @@
-"""Who passes: the virtual operator's three profiles at the exercises, many seeds each, beside what is asked of them.
+"""Pass rates of the operator's three profiles at the exercises, many seeds each, with their requirements.
 
 Prints a table of passes by profile with the criteria that failed most often, and writes skills.csv and skills.svg.
 Usage: python benchmarks/skills.py [EXERCISE...] [--seeds 50] [--first-seed 1000] [--workers N] [--out DIR] [--draw]

@@ -4,7 +4,7 @@ A replicate is two models in five cases, three readings each of by' and by", twe
 that the models make, with residuals at checks. Prints CPU seconds of one process and peak memory; the ratio is to be at
 most five. Growth with replicates, points measured, and models is given by the straight line through the times (fixed
 cost, cost of one more) with the departures from it, and by the slope of their logarithms: 1 is linear, less
-if a part of the time does not grow. Works studies/thesis-1985.toml once that is there.
+if a part of the time does not grow. Runs studies/thesis-1985.toml if it exists.
 Usage: python benchmarks/study.py [--replicates N] [--chunk N] [--growth N]
 """
 

@@ -1,4 +1,4 @@
-"""A class graded: two hundred students' journals on two cores, and one journal beside its bare replay.
+"""Time the grading of a class: two hundred students' journals on two cores, and one journal beside its bare replay.
 
 Prints the seconds of the class (to be below 60 on two cores), and how much longer grading takes than replaying.
 """
@@ -21,13 +21,13 @@ from a7sim.training.variation import attempt_seed
 STUDENTS, CORES = 200, 2
 
 DONE = (("4", PlayedRun(procedure="measure parallaxes", observer={"skill": "trained"})), ("14", None), ("1", None))
-"""A long journal, one whose papers are to be made again, and a short one, by turns."""
+"""A long journal, one whose handouts are generated again, and a short one, in turn."""
 
 
 def timed(does):
-    begun = time.perf_counter()
+    start = time.perf_counter()
     does()
-    return time.perf_counter() - begun
+    return time.perf_counter() - start
 
 
 def main():

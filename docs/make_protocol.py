@@ -101,7 +101,7 @@ GIVEN = {
 }
 """Parameters of the examples."""
 
-BEFORE = {
+PREPARATIONS = {
     "RECord?": 'REC "1011"',
     "RECord:LAST?": 'REC "1011"',
     "RECord:STRike": 'REC "1011"',
@@ -193,29 +193,29 @@ class Instrument:
         scenario, drawer = _equipment(variant)
         self.engine: Engine = SharedInstrument(build_autograph(scenario.instrument, drawer, 7)).open()
         self._clock = Clock()
-        self.say(MOUNTED[variant])
+        self.send(MOUNTED[variant])
 
-    def say(self, line):
+    def send(self, line):
         reply = feed_until_idle(self.engine, line.encode() + b"\n", self._clock)
         taken = parse_reply(reply)
         return ";".join(map(part_as_text, taken.parts)) if taken else ""
 
     def errors(self):
-        count = int(self.say("SYST:ERR:COUN?"))
-        return [int(self.say("SYST:ERR?").split(",")[0]) for _ in range(count)]
+        count = int(self.send("SYST:ERR:COUN?"))
+        return [int(self.send("SYST:ERR?").split(",")[0]) for _ in range(count)]
 
 
 def example_of(command):
     """Return the line of an example and the instrument's answer."""
     variant = "A8" if command.header.startswith("COMMon") else "A7"
     instrument = Instrument(variant)
-    instrument.say(BEFORE.get(command.header, ""))
+    instrument.send(PREPARATIONS.get(command.header, ""))
     line = _description(command)
     if not command.query:
         own = next((each for each in COMMANDS.commands if each.header == f"{command.header}?"), None)
         shown = SHOWN_BY.get(command.header) or (own and _description(own))
         line = f"{line};{'' if shown is None or shown.startswith('*') else ':'}{shown}" if shown else line
-    return line, instrument.say(line)
+    return line, instrument.send(line)
 
 
 def _description(command):
@@ -228,9 +228,9 @@ def ranges_of(command, variant):
     if command.header == "BASE:MODE":
         return " or ".join(VARIANTS[variant].base_modes)
     instrument = Instrument(variant)
-    instrument.say(BEFORE.get(command.header, ""))
+    instrument.send(PREPARATIONS.get(command.header, ""))
     instrument.errors()
-    instrument.say(_description(command))
+    instrument.send(_description(command))
     if -221 in instrument.errors():
         return "not on it"
     if command.header == "GEAR:HEIGht":
@@ -252,13 +252,13 @@ def _of_both(quantity, engine, command):
 
 def _limits(quantity, engine, number):
     try:
-        low, high, usual = quantity.limits(engine, number)
+        low, high, default = quantity.limits(engine, number)
     except AutographError:
         return "not on it"
-    unit = quantity.unit_there(engine) if quantity.unit_there else quantity.unit
+    unit = quantity.instrument_unit(engine) if quantity.instrument_unit else quantity.unit
     if high == MAX_READING:
         return f"±{high:.2f} {unit}".strip()
-    return f"{low:.10g} to {high:.10g} {unit}".strip() + f" ({usual:.10g})"
+    return f"{low:.10g} to {high:.10g} {unit}".strip() + f" ({default:.10g})"
 
 
 def errors_of(command):
@@ -284,7 +284,7 @@ def errors_of(command):
 
 
 def _unit_errors(kind):
-    if getattr(kind, "unit_there", None):
+    if getattr(kind, "instrument_unit", None):
         return {-131, -138}
     return {-131} if getattr(kind, "unit", "") else {-138}
 

@@ -55,8 +55,8 @@ def copied(whole, tmp_path):
 
 
 def resumed(folder):
-    begun = find_resumable(folder, "run")
-    return run(begun.scenario, begun.seed, RunOptions(folder, journal_options=JournalOptions(resumes=True)))
+    resumable = find_resumable(folder, "run")
+    return run(resumable.scenario, resumable.seed, RunOptions(folder, journal_options=JournalOptions(resumes=True)))
 
 
 def forged(journalled, header=None, change=lambda number, data: data):
@@ -297,10 +297,10 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
     light = msgspec.structs.replace(light, models=light.models[:1])
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     strip_combinations.run_combinations(light, 1985, RunOptions(whole))
-    begun = iter(["no", "yes"])
+    answers = iter(["no", "yes"])
 
     def interrupt(activity):
-        if "model coordinates" in activity and next(begun) == "yes":
+        if "model coordinates" in activity and next(answers) == "yes":
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):

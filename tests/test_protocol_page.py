@@ -38,9 +38,9 @@ def test_the_page_is_fresh(maker):
 def test_every_example_of_the_page_is_obeyed(maker):
     for command in maker.COMMANDS.commands:
         instrument = maker.Instrument("A8" if command.header.startswith("COMMon") else "A7")
-        instrument.say(maker.BEFORE.get(command.header, ""))
+        instrument.send(maker.PREPARATIONS.get(command.header, ""))
         instrument.errors()
-        reply = instrument.say(maker.example_of(command)[0])
+        reply = instrument.send(maker.example_of(command)[0])
         assert command.query <= bool(reply)
         assert instrument.errors() == [], command.header
 

@@ -87,8 +87,10 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
     (cut / "results.json").unlink()
     shutil.rmtree(cut / INDEPENDENT)
     cut_off(bridged / INDEPENDENT, cut / INDEPENDENT, 0.3)
-    begun = find_resumable(cut, "bridge")
-    document = run_bridge(begun.scenario, begun.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True)))
+    resumable = find_resumable(cut, "bridge")
+    document = run_bridge(
+        resumable.scenario, resumable.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True))
+    )
     assert json.loads((cut / "results.json").read_text(encoding="utf-8")) == json.loads(json.dumps(document))
     assert without_what_was_torn(files_of(cut)) == files_of(bridged)
 
@@ -101,10 +103,10 @@ def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independe
         raise KeyboardInterrupt
 
     cut = Path(shutil.copytree(bridged, tmp_path / "cut"))
-    begun = find_resumable(cut, "bridge")
+    resumable = find_resumable(cut, "bridge")
     monkeypatch.setattr("a7sim.session.bridge.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        run_bridge(begun.scenario, begun.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True)))
+        run_bridge(resumable.scenario, resumable.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True)))
     results = msgspec.json.decode((cut / "results.json").read_bytes())
     assert results["status"] == "interrupted"
     assert results["bridged"]["strip"]
@@ -121,9 +123,9 @@ def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_pat
     assert JournalOptions(resumes=True).for_part(cut / INDEPENDENT) == JournalOptions(resumes=False)
 
 
-@pytest.mark.parametrize(("left", "begun"), [(None, False), (b"", False), (b'{"schema', False), (b'{}\n{"t"', True)])
-def test_a_part_is_gone_on_with_where_the_header_of_its_journal_is_whole(tmp_path, left, begun):
+@pytest.mark.parametrize(("left", "resumes"), [(None, False), (b"", False), (b'{"schema', False), (b'{}\n{"t"', True)])
+def test_a_part_is_gone_on_with_where_the_header_of_its_journal_is_whole(tmp_path, left, resumes):
     """Cut off sooner, nothing was observed in it, and it is begun anew."""
     if left is not None:
         (tmp_path / JOURNAL).write_bytes(left)
-    assert JournalOptions(resumes=True).for_part(tmp_path) == JournalOptions(resumes=begun)
+    assert JournalOptions(resumes=True).for_part(tmp_path) == JournalOptions(resumes=resumes)

@@ -287,7 +287,7 @@ def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
 
 
 def _kept(wire):
-    return wire._transport.get_write_buffer_size(), len(wire._conversation._backlog)
+    return wire._transport.get_write_buffer_size(), len(wire._session._backlog)
 
 
 def test_a_client_that_reads_late_gets_every_reply_in_order(served):

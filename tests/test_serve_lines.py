@@ -109,11 +109,11 @@ def test_a_terminal_whose_client_does_not_read_begins_anew(link):
     with ServerThread(
         limits=ServerLimits(write_timeout=0.2), endpoints=Endpoints(pty=[link], tcp=[ANY_PORT])
     ) as served:
-        first = served.server._terminals[0]._conversation
+        first = served.server._terminals[0]._session
         far = os.open(link, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(far)
         os.write(far, b"SYST:LOCK:REQ?\n" + b"SYST:HELP:HEAD?\n" * 100)
-        assert served.until(lambda: served.server._terminals[0]._conversation is not first)
+        assert served.until(lambda: served.server._terminals[0]._session is not first)
         other = served.line()
         assert other.ask("SYST:LOCK:REQ?") == "1"
         os.close(far)
@@ -127,10 +127,10 @@ def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
     with ServerThread(endpoints=Endpoints(pty=[link])) as served, at(served) as port:
         sender = threading.Thread(target=port.write, args=(b"*IDN?\n" * count,))
         sender.start()
-        assert served.until(lambda: served.server._terminals[0]._clogged)
+        assert served.until(lambda: served.server._terminals[0]._write_blocked)
         assert port.read(count * (len(IDENTITY) + 1)) == f"{IDENTITY}\n".encode() * count
         sender.join()
-        assert not served.server._terminals[0]._clogged
+        assert not served.server._terminals[0]._write_blocked
 
 
 def test_a_terminal_long_silent_frees_its_lock_and_stays(link):

@@ -16,5 +16,5 @@ def bundled_dirs(kind: Kind) -> tuple[Path, Path]:
 def bundled_names(kind: Kind) -> list[str]:
     """Return the names of all files of a kind that come with a7sim, in alphabetical order."""
     files = "*/exercise.toml" if kind == "exercises" else "*.toml"
-    found = {file for shelf in bundled_dirs(kind) for file in shelf.glob(files)}
+    found = {file for folder in bundled_dirs(kind) for file in folder.glob(files)}
     return sorted({file.parent.name if kind == "exercises" else file.stem for file in found})

@@ -41,7 +41,7 @@ class LocalConsole:
     def _decide_by_options(self, out: Path | None) -> None:
         last = self._last_session()
         if self._resume:
-            if last is None or last.begun is None:
+            if last is None or last.resumable is None:
                 reason = last.error if last else "found none"
                 raise A7SimError(
                     f"--resume: expected a session of {self._name} at seed {self._seed} in {self._folder}: {reason}"
@@ -79,7 +79,7 @@ class LocalConsole:
         last = self._last_session()
         if last is None:
             return None
-        if last.begun is None:
+        if last.resumable is None:
             self._greeting = f"new session: the last one cannot be resumed: {last.error}"
             return None
         if not last.has_changes:
@@ -101,7 +101,7 @@ class LocalConsole:
         if self._interactive is None:
             from a7sim.journal.interactive import InteractiveSession  # during the first paint of the screen
 
-            session = self._resumed.begun if self._resumed else None
+            session = self._resumed.resumable if self._resumed else None
             self._interactive = InteractiveSession(self._scenario, self._seed, self._folder, self._clock, session)
         return self._interactive.open()
 

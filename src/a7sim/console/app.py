@@ -198,7 +198,7 @@ class Console(MessageHandlers, Actions, App[None]):
             self.main.show_hints(hints(keys, self.selection, magnification, self.point, pricked, unstruck))
         self._masthead()
 
-    # --- what widgets tell ---------------------------------------------------------------------------
+    # --- messages of widgets --------------------------------------------------------------------------
 
     @on(EyepieceWidget.Resized)
     def _resized(self) -> None:

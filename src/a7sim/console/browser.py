@@ -113,14 +113,16 @@ def serve(command: Sequence[str], port: int, idle_s: float, announce: Callable[[
     `told` is called with the address. It also ends when no page has been open for `idle_s` seconds.
     """
     try:
-        door = socket.create_server((LOOPBACK, port))
+        server_socket = socket.create_server((LOOPBACK, port))
     except OSError as error:
         raise A7SimError(f"--port {port}: expected a port that is free: {os.strerror(error.errno or 0)}") from error
-    with door:
-        return asyncio.run(_serving(command, door, idle_s, announce))
+    with server_socket:
+        return asyncio.run(_serving(command, server_socket, idle_s, announce))
 
 
-async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, announce: Callable[[str], None]) -> bool:
+async def _serving(
+    command: Sequence[str], server_socket: socket.socket, idle_s: float, announce: Callable[[str], None]
+) -> bool:
     loop, ended = asyncio.get_running_loop(), asyncio.Event()
     alone = False
 
@@ -129,7 +131,7 @@ async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, a
         alone = True
         ended.set()
 
-    port = door.getsockname()[1]
+    port = server_socket.getsockname()[1]
     visitors = OpenPages(idle_s, left_alone)
     runner = web.AppRunner(
         await BrowserServer(command, port, visitors).application(), access_log=None, shutdown_timeout=CLOSING_S
@@ -138,7 +140,7 @@ async def _serving(command: Sequence[str], door: socket.socket, idle_s: float, a
         loop.add_signal_handler(number, ended.set)
     await runner.setup()
     try:
-        await web.SockSite(runner, door).start()
+        await web.SockSite(runner, server_socket).start()
         visitors.watch()
         announce(f"http://{LOOPBACK}:{port}/")
         await ended.wait()

@@ -226,7 +226,7 @@ class Autograph:
         taken, self._taken = self._taken, {}
         return taken
 
-    # --- how all of it stands -------------------------------------------------------------------------
+    # --- state ----------------------------------------------------------------------------------------
 
     def state(self, changes: int = 0) -> State:
         """Return the complete state for `restore`: part of the truth.

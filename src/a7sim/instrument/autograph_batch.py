@@ -184,7 +184,7 @@ class AutographBatch:
         moved = [n for n in (1, 2) if name in ("bx", "common_phi") or name.endswith(str(n))]
         reached_centres: dict[int, Array] = {}
         if name in MOVE_CENTRES:
-            reached_centres = {n: self._centres_told(active, n, {name: targets}) for n in moved}
+            reached_centres = {n: self._drum_centres(active, n, {name: targets}) for n in moved}
             allowed &= self._rods_can(active, reached_centres)
         if not allowed.all():
             self._refuse(active[~allowed], f"Data out of range;{name}: beyond its range or that of the rods")
@@ -201,7 +201,7 @@ class AutographBatch:
         """Set base inside or outside."""
         inside = mode == "inside"
         base_inside = np.full(active.size, inside)
-        able = self._rods_can(active, {n: self._centres_told(active, n, base_inside=base_inside) for n in (1, 2)})
+        able = self._rods_can(active, {n: self._drum_centres(active, n, base_inside=base_inside) for n in (1, 2)})
         self._refuse(active[~able], f"Data out of range;base {mode}: beyond the range of the rods")
         self._base_inside[active[able]] = inside
         self._levers = None
@@ -370,7 +370,7 @@ class AutographBatch:
         """Return a lateral reach of a rod at all depths, well within its limit."""
         return 0.99 * math.tan(self.variant.rod_limit_gon * GON)
 
-    def _centres_told(
+    def _drum_centres(
         self,
         active: Indices,
         n: int,
@@ -438,7 +438,7 @@ class AutographBatch:
         bundles.turned[:, :, active] = turned
         bundles.swung[:, :, active] = plane_rotation(kappa)
         put(self._drums[f"c{n}"].position(active), active, bundles.c)
-        self._shift(active, n, self._centres_told(active, n))
+        self._shift(active, n, self._drum_centres(active, n))
 
     def _shift(self, active: Indices, n: int, reached_centres: Array) -> None:
         """Move the projectors, with unchanged rotation, to the positions by base, by and bz, given as ``(3, m)``."""

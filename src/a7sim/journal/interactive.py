@@ -20,24 +20,24 @@ from a7sim.scene import build_scene
 class InteractiveSession:
     """Session at the instrument of a scenario, which is built on first use.
 
-    The journal starts in a new folder of the name `folder`, or continues if `begun` is an earlier session.
+    The journal starts in a new folder of the name `folder`, or continues if `resumable` is an earlier session.
     """
 
     def __init__(
-        self, scenario: Scenario, seed: int, folder: Path, clock: Clock, begun: ResumableSession | None = None
+        self, scenario: Scenario, seed: int, folder: Path, clock: Clock, resumable: ResumableSession | None = None
     ) -> None:
         self.clock = clock
-        self.begun = begun
-        self.folder = begun.journalled.path.parent if begun else folder
+        self.resumable = resumable
+        self.folder = resumable.journalled.path.parent if resumable else folder
         self._scenario, self._seed = scenario, seed
-        self._journal = Journal(JournalOptions(resumes=begun is not None))
+        self._journal = Journal(JournalOptions(resumes=resumable is not None))
         self._instrument: SharedInstrument | None = None
         self._locked = False
 
     def open(self) -> Client:
         """Return a client of the instrument. Raises A7SimError if the journal cannot be written or continued."""
         if self._instrument is None:
-            self._instrument = self._start() if self.begun is None else self._resume(self.begun)
+            self._instrument = self._start() if self.resumable is None else self._resume(self.resumable)
         client = Client(InProcessSerial(instrument=self._instrument, clock=self.clock, timeout=TIMEOUT_S))
         if self._locked:
             client.ask("SYST:LOCK:REQ?")
@@ -53,15 +53,15 @@ class InteractiveSession:
         self._journal.recording(self.folder, make_header(COMMAND, scenario, seed), instrument)
         return instrument
 
-    def _resume(self, begun: ResumableSession) -> SharedInstrument:
-        instrument, time, lock_holder = restore_instrument(begun, self._journal, from_checkpoint=True)
+    def _resume(self, resumable: ResumableSession) -> SharedInstrument:
+        instrument, time, lock_holder = restore_instrument(resumable, self._journal, from_checkpoint=True)
         self.clock.advance_to(time)
         self._locked = lock_holder is not None
         return instrument
 
     def history(self) -> Iterator[Event]:
         """Yield the lines and replies of the resumed session."""
-        existing = self.begun.journalled if self.begun else None
+        existing = self.resumable.journalled if self.resumable else None
         for number in range(2, len(existing) + 1 if existing else 0):
             assert existing is not None
             event = existing.event(number)

@@ -55,18 +55,20 @@ class RestoredInstrument(NamedTuple):
     lock_holder: str | None
 
 
-def restore_instrument(begun: ResumableSession, journal: Journal, from_checkpoint: bool = False) -> RestoredInstrument:
+def restore_instrument(
+    resumable: ResumableSession, journal: Journal, from_checkpoint: bool = False
+) -> RestoredInstrument:
     """Return an instrument in the state of its journal; the journal continues.
 
     All events, or those behind the last checkpoint, are replayed. Raises A7SimError if the replay differs.
     """
-    replay = Replay(begun.journalled)
-    first = replay.seek(len(begun.journalled) + 1) if from_checkpoint else 2
+    replay = Replay(resumable.journalled)
+    first = replay.seek(len(resumable.journalled) + 1) if from_checkpoint else 2
     for number, _, difference in replay_lines(replay, first):
         if difference is not None:
-            raise A7SimError(f"{begun.journalled.location(number)}: {_difference_message(difference)}")
+            raise A7SimError(f"{resumable.journalled.location(number)}: {_difference_message(difference)}")
     instrument = replay.instrument
-    instrument.listener = journal.resume_at(begun.journalled, instrument, replay.checkpoints).on_link_event
+    instrument.listener = journal.resume_at(resumable.journalled, instrument, replay.checkpoints).on_link_event
     for event in replay.pending_events():
         journal.on_link_event(event)
     lock_holder = instrument.lock_holder

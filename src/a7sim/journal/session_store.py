@@ -20,22 +20,22 @@ class SavedSession:
     """Session that was left or interrupted."""
 
     folder: Path
-    begun: ResumableSession | None
+    resumable: ResumableSession | None
     error: str = ""
-    """Reason why it cannot be resumed, if `begun` is None."""
+    """Reason why it cannot be resumed, if `resumable` is None."""
 
     @property
     def ended_at_s(self) -> float:
         """Simulated time in s of its end."""
-        journalled = self.begun.journalled if self.begun else ()
-        return self.begun.journalled.event(len(journalled)).t if self.begun and len(journalled) > 1 else 0.0
+        journalled = self.resumable.journalled if self.resumable else ()
+        return self.resumable.journalled.event(len(journalled)).t if self.resumable and len(journalled) > 1 else 0.0
 
     @property
     def has_changes(self) -> bool:
         """Return whether anything was changed, and not only viewed."""
-        if self.begun is None:
+        if self.resumable is None:
             return False
-        journals = self.begun.journalled
+        journals = self.resumable.journalled
         events = (journals.event(number) for number in range(len(journals), 1, -1))
         return any(event.dir == ">" and _is_change(event.text) for event in events)
 

@@ -29,12 +29,12 @@ class Serial(InProcessSerial):
     def _connect(self) -> SharedInstrument:
         url = str(self.port)
         if self._instrument is None or self._connected_to != url:
-            self._instrument, self._connected_to = _described_by(url), url
+            self._instrument, self._connected_to = _build_instrument(url), url
         return self._instrument
 
 
-def _described_by(url: str) -> SharedInstrument:
-    scenario_name, seed = _taken_apart(url)
+def _build_instrument(url: str) -> SharedInstrument:
+    scenario_name, seed = _parse_url(url)
     try:
         scenario = load_scenario(scenario_name)
         chosen = scenario.seed if seed is None else seed
@@ -44,7 +44,7 @@ def _described_by(url: str) -> SharedInstrument:
     return SharedInstrument(autograph)
 
 
-def _taken_apart(url: str) -> tuple[str, int | None]:
+def _parse_url(url: str) -> tuple[str, int | None]:
     found = _URL.fullmatch(url)
     if found is None:
         raise SerialException(f"expected a URL like {_EXAMPLE}, got {url!r}")

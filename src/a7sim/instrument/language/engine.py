@@ -28,8 +28,8 @@ MAX_LINE_LENGTH = 4096
 MAX_REPLY = 4 * 1024 * 1024
 """Bytes of the replies to one line."""
 
-UNITS_AT_ONCE, REPLY_AT_ONCE = 50, 64 * 1024
-"""Units of a line, and bytes of their replies, executed before other clients may have their turn."""
+MAX_UNITS_PER_TURN, MAX_REPLY_PER_TURN = 50, 64 * 1024
+"""Units of a line, and bytes of their replies, executed before commands of other clients."""
 
 MAX_BUFFERED_BYTES = 64 * 1024
 """Bytes of input buffered behind a unit that waits for movement."""
@@ -37,7 +37,7 @@ MAX_BUFFERED_BYTES = 64 * 1024
 _MAX_PENDING_LENGTH = MAX_LINE_LENGTH + 2
 """A line, the CR of its end, and one byte that reveals a line as too long."""
 
-_TOO_MUCH = f"expected replies of at most {MAX_REPLY} bytes a line"
+_REPLIES_TOO_LONG = f"expected replies of at most {MAX_REPLY} bytes a line"
 
 _NUMBER_OF = {
     OutOfRangeError: ErrorNumber.DATA_OUT_OF_RANGE,
@@ -51,7 +51,7 @@ class Engine:
 
     `waits_until` is the simulated time in s up to which the client's input waits for movement to end, None without a
     wait. Until `feed` is called at that time or later, possibly with no bytes, input is buffered and not executed.
-    Within a long line it is now and then the present time, so that other clients may have their turn.
+    Within a long line it is sometimes the present time, so that commands of other clients are executed.
     """
 
     def __init__(self, instrument: LockedInstrument, client: str, cr_ends_line: bool = True) -> None:
@@ -64,11 +64,11 @@ class Engine:
         self._movement_seen = instrument.busy_since
         self._completes_at: float | None = None
         self._cr_ends_line = cr_ends_line
-        self._ends = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
+        self._line_end = re.compile(rb"[\r\n]" if cr_ends_line else rb"\n")
         self._pending = bytearray()
-        self._kept_back = bytearray()
+        self._buffered_input = bytearray()
         self._overrun = False
-        self._rest: Program = ()
+        self._remaining_units: Program = ()
         self._waited = False
         self._replies: list[str | bytes] = []
         self._reply_size = 0
@@ -82,39 +82,39 @@ class Engine:
         """Process bytes received at a simulated time in s; return the reply to each line that has one."""
         self._time = time
         if self.waits_until is None and not self._pending and self._admitted and self.instrument.listener is None:
-            question = cached_query(received, self._cr_ends_line)
-            if question is not None:
-                return self._answer(question)
+            query = cached_query(received, self._cr_ends_line)
+            if query is not None:
+                return self._answer_query(query)
         replies: list[bytes] = []
-        if self.waits_until is None and not self._pending and self._one_line(received):
-            self._obey_line(received, replies)
+        if self.waits_until is None and not self._pending and self._is_one_line(received):
+            self._execute_line(received, replies)
             return replies
         if self.waits_until is not None:
             if time < self.waits_until:
-                self._keep_back(received)
+                self._buffer_input(received)
                 return replies
             received = self._resume(replies) + received
         start = 0
         while self.waits_until is None:
-            end = self._ends.search(received, start)
+            end = self._line_end.search(received, start)
             if end is None:
-                self._keep(received[start:])
+                self._append_pending(received[start:])
                 return replies
-            self._keep(received[start : end.start()])
+            self._append_pending(received[start : end.start()])
             start = end.end()
             line = bytes(self._pending)
             self._pending.clear()
-            self._obey_line(line, replies)
-        self._keep_back(received[start:])
+            self._execute_line(line, replies)
+        self._buffer_input(received[start:])
         return replies
 
-    def _answer(self, question: CachedQuery) -> list[bytes]:
+    def _answer_query(self, query: CachedQuery) -> list[bytes]:
         try:
-            reply = question.handler(self, question.call)
+            reply = query.handler(self, query.call)
         except CommandError as error:
             self._report(error)
         except AutographError as refusal:
-            self._report(_error_of(refusal, question.text))
+            self._report(_error_of(refusal, query.text))
         else:
             return [_as_bytes(reply) + b"\n"] if reply is not None else []
         return []
@@ -122,8 +122,8 @@ class Engine:
     def _report(self, error: CommandError) -> None:
         self._status.report(error.number, error.detail)
 
-    def _one_line(self, received: bytes) -> bool:
-        """Return whether the input is exactly one line, which is the usual case."""
+    def _is_one_line(self, received: bytes) -> bool:
+        """Return whether the input is exactly one line, as it usually is."""
         length = len(received)
         return received.find(b"\n") == length - 1 <= MAX_LINE_LENGTH and (
             not self._cr_ends_line or b"\r" not in received
@@ -131,68 +131,68 @@ class Engine:
 
     def _resume(self, replies: list[bytes]) -> bytes:
         """Execute the rest of a line that waited; return the input buffered behind it."""
-        self._heard("~", "")
+        self._notify("~", "")
         self.waits_until = None
-        self._obey_rest(replies)
+        self._execute_remaining_units(replies)
         if self.waits_until is not None:
             return b""
-        kept = bytes(self._kept_back)
-        self._kept_back.clear()
+        buffered = bytes(self._buffered_input)
+        self._buffered_input.clear()
         if self._overrun:
             self._overrun = False
-            kept += b"\0" * _MAX_PENDING_LENGTH
-        return kept
+            buffered += b"\0" * _MAX_PENDING_LENGTH
+        return buffered
 
-    def _keep_back(self, received: bytes) -> None:
-        room = MAX_BUFFERED_BYTES - len(self._kept_back)
-        self._kept_back += received[:room]
-        self._overrun |= len(received) > room
+    def _buffer_input(self, received: bytes) -> None:
+        capacity = MAX_BUFFERED_BYTES - len(self._buffered_input)
+        self._buffered_input += received[:capacity]
+        self._overrun |= len(received) > capacity
 
-    def _keep(self, part: bytes) -> None:
+    def _append_pending(self, part: bytes) -> None:
         self._pending += part[: _MAX_PENDING_LENGTH - len(self._pending)]
 
-    def _obey_line(self, line: bytes, replies: list[bytes]) -> None:
+    def _execute_line(self, line: bytes, replies: list[bytes]) -> None:
         if len(line) > MAX_LINE_LENGTH and len(strip_line_end(line)) > MAX_LINE_LENGTH:
-            self._heard("!", f"(a line of more than {MAX_LINE_LENGTH} bytes, dropped)")
+            self._notify("!", f"(a line of more than {MAX_LINE_LENGTH} bytes, dropped)")
             self._status.report(ErrorNumber.INPUT_BUFFER_OVERRUN, f"expected at most {MAX_LINE_LENGTH} bytes a line")
             return
         if self.instrument.listener is not None:
-            self._tell(strip_line_end(line))
-        self._rest = parse_program(line)
-        self._obey_rest(replies)
+            self._notify_line(strip_line_end(line))
+        self._remaining_units = parse_program(line)
+        self._execute_remaining_units(replies)
 
-    def _tell(self, text: str) -> None:
+    def _notify_line(self, text: str) -> None:
         if text.strip(" \t"):
             token = self.instrument.token
-            self._heard(">", text if token is None else redact_token(text, token))
+            self._notify(">", text if token is None else redact_token(text, token))
 
-    def _heard(self, direction: str, text: str) -> None:
+    def _notify(self, direction: str, text: str) -> None:
         self.instrument.notify(self._time, self.client, direction, text)
 
-    def _obey_rest(self, replies: list[bytes]) -> None:
+    def _execute_remaining_units(self, replies: list[bytes]) -> None:
         """Execute the remaining units of a line, up to one that waits; at its end, append its reply if it has one."""
-        program = self._rest
-        breath = self._reply_size + REPLY_AT_ONCE
+        program = self._remaining_units
+        max_size = self._reply_size + MAX_REPLY_PER_TURN
         for place, unit in enumerate(program):
             try:
-                done = self._obey(unit)
+                done = self._execute(unit)
             except CommandError as error:
                 self._report(error)
                 done = True
-            if (place >= UNITS_AT_ONCE or self._reply_size > breath) and self.waits_until is None:
+            if (place >= MAX_UNITS_PER_TURN or self._reply_size > max_size) and self.waits_until is None:
                 self.waits_until = self._time
             if self.waits_until is not None:
-                self._rest = program[place + done :]
+                self._remaining_units = program[place + done :]
                 return
         if self._replies:
             if self.instrument.listener is not None:
-                self._heard("<", ";".join(map(loggable_reply, self._replies)))
+                self._notify("<", ";".join(map(loggable_reply, self._replies)))
             replies.append(b";".join(map(_as_bytes, self._replies)) + b"\n")
             self._replies.clear()
             self._reply_size = 0
             self._overflowed = False
 
-    def _obey(self, unit: ParsedCommand | ParseFailure) -> bool:
+    def _execute(self, unit: ParsedCommand | ParseFailure) -> bool:
         """Execute a unit; return False if it must wait. Raises CommandError."""
         if not self._admitted and (isinstance(unit, ParseFailure) or not unit.command.allowed_before_login):
             raise CommandError(ErrorNumber.COMMAND_PROTECTED, "expected SYSTem:LOGin first")
@@ -203,10 +203,10 @@ class Engine:
             call = unit.bare or unit.call(self)
             if command.moves and not self.instrument.may_move(self.client):
                 raise CommandError(ErrorNumber.COMMAND_PROTECTED, "another client holds the lock")
-            if command.waits and self._has_to_wait():
+            if command.waits and self._must_wait():
                 return False
             if self._overflowed and command.query:
-                raise CommandError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
+                raise CommandError(ErrorNumber.QUERY_DEADLOCKED, _REPLIES_TOO_LONG)
             reply = command.handler(self, call)
         except AutographError as refusal:
             raise _error_of(refusal, unit.text) from refusal
@@ -214,12 +214,12 @@ class Engine:
             if command.moves:
                 self.instrument.note_movement(self._time)
         if reply is not None:
-            self._answered(reply)
+            self._append_reply(reply)
         if command.polls and self._time < self.instrument.busy_until:
             self.waits_until = self.instrument.poll_until(self._time)
         return True
 
-    def _has_to_wait(self) -> bool:
+    def _must_wait(self) -> bool:
         """Wait for the current movement, once: movements that other clients start meanwhile are not waited for."""
         if self._waited:
             self._waited = False
@@ -228,14 +228,14 @@ class Engine:
             self._waited = True
         return self._waited
 
-    def _answered(self, reply: str | bytes) -> None:
+    def _append_reply(self, reply: str | bytes) -> None:
         self._overflowed = self._reply_size + len(reply) > MAX_REPLY
         if self._overflowed:
-            raise CommandError(ErrorNumber.QUERY_DEADLOCKED, _TOO_MUCH)
+            raise CommandError(ErrorNumber.QUERY_DEADLOCKED, _REPLIES_TOO_LONG)
         self._reply_size += len(reply)
         self._replies.append(reply)
 
-    # --- how the conversation stands ------------------------------------------------------------------
+    # --- state -----------------------------------------------------------------------------------------
 
     def state(self) -> dict[str, Any]:
         """Return the state of the session, without waiting lines; for `restore`."""
@@ -253,7 +253,7 @@ class Engine:
         self._completes_at = state["completes_at"]
         self._movement_seen = -math.inf if state["movement_seen"] is None else state["movement_seen"]
 
-    # --- what handlers ask of the conversation --------------------------------------------------------
+    # --- context of command handlers --------------------------------------------------------------------
 
     @property
     def status(self) -> Status:

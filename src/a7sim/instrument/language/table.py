@@ -8,6 +8,7 @@ from typing import Any, Protocol
 
 from msgspec import Struct
 
+from a7sim.instrument.language.context import CommandContext
 from a7sim.instrument.language.errors import CommandError, ErrorNumber
 from a7sim.instrument.language.syntax import Number, Parameter, Text, Word
 
@@ -20,7 +21,7 @@ Limits = tuple[float, float, float]
 """MIN, MAX, DEF."""
 
 
-Handler = Callable[[Any, "Call"], str | bytes | None]
+Handler = Callable[[CommandContext, "Call"], str | bytes | None]
 
 
 class Call(Struct, frozen=True, gc=False):
@@ -37,7 +38,7 @@ class ParameterType(Protocol):
     def optional(self) -> bool:
         """Whether the parameter may be left out."""
 
-    def read(self, parameter: Parameter, client: Any, suffix: int) -> Any:
+    def read(self, parameter: Parameter, context: CommandContext, suffix: int) -> Any:
         """Return the value. Raises CommandError."""
 
     def describe(self) -> str:
@@ -49,20 +50,20 @@ class Quantity:
     """Number in mm, in gon or without unit; MIN, MAX and DEF if it has limits."""
 
     unit: str = ""
-    limits: Callable[[Any, int], Limits] | None = None
+    limits: Callable[[CommandContext, int], Limits] | None = None
     whole: bool = False
     optional: bool = False
     name: str = "value"
-    unit_there: Callable[[Any], str] | None = None
-    """Returns the unit if it depends on the instrument."""
+    instrument_unit: Callable[[CommandContext], str] | None = None
+    """Function that returns the unit, if it depends on the instrument."""
 
-    def read(self, parameter: Parameter, client: Any, suffix: int) -> float:
+    def read(self, parameter: Parameter, context: CommandContext, suffix: int) -> float:
         """Return the number in its base unit."""
         if isinstance(parameter, Word):
-            return self._named(parameter, client, suffix)
+            return self._named(parameter, context, suffix)
         if not isinstance(parameter, Number):
             raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a number, got the text '{parameter.value}'")
-        factors = UNITS[self.unit_there(client) if self.unit_there else self.unit]
+        factors = UNITS[self.instrument_unit(context) if self.instrument_unit else self.unit]
         if parameter.unit not in factors:
             if len(factors) == 1:
                 raise CommandError(ErrorNumber.SUFFIX_NOT_ALLOWED, f"expected a bare number, got {parameter.unit}")
@@ -73,12 +74,12 @@ class Quantity:
             raise CommandError(ErrorNumber.DATA_OUT_OF_RANGE, f"expected less than 1E12, got {parameter.value:g}")
         return float(round(value)) if self.whole else value
 
-    def _named(self, word: Word, client: Any, suffix: int) -> float:
+    def _named(self, word: Word, context: CommandContext, suffix: int) -> float:
         places = {"MIN": 0, "MINIMUM": 0, "MAX": 1, "MAXIMUM": 1, "DEF": 2, "DEFAULT": 2}
         if self.limits is None or word.value not in places:
             allowed = "a number, MIN, MAX or DEF" if self.limits else "a number"
             raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected {allowed}, got {word.value}")
-        return self.limits(client, suffix)[places[word.value]]
+        return self.limits(context, suffix)[places[word.value]]
 
     def describe(self) -> str:
         """Return the notation of the number."""
@@ -92,7 +93,7 @@ class Choice:
     words: tuple[str, ...]
     optional: bool = False
 
-    def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
+    def read(self, parameter: Parameter, context: CommandContext, suffix: int) -> str:
         """Return the chosen word in lower case, long form."""
         if not isinstance(parameter, Word):
             raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected {self.describe()}")
@@ -113,7 +114,7 @@ class Quoted:
     name: str = "text"
     optional: bool = False
 
-    def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
+    def read(self, parameter: Parameter, context: CommandContext, suffix: int) -> str:
         """Return the text."""
         if not isinstance(parameter, Text):
             raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a text in quotes, got {parameter.value}")
@@ -131,11 +132,11 @@ class QuotedOrNumber:
     name: str = "name"
     optional: bool = False
 
-    def read(self, parameter: Parameter, client: Any, suffix: int) -> str | float:
+    def read(self, parameter: Parameter, context: CommandContext, suffix: int) -> str | float:
         """Return the text or the number."""
         if isinstance(parameter, Text):
             return parameter.value
-        return Quantity().read(parameter, client, suffix)
+        return Quantity().read(parameter, context, suffix)
 
     def describe(self) -> str:
         """Return both notations."""
@@ -149,7 +150,7 @@ class AnyWord:
     name: str = "word"
     optional: bool = True
 
-    def read(self, parameter: Parameter, client: Any, suffix: int) -> str:
+    def read(self, parameter: Parameter, context: CommandContext, suffix: int) -> str:
         """Return the word in capitals."""
         if not isinstance(parameter, Word):
             raise CommandError(ErrorNumber.DATA_TYPE_ERROR, f"expected a word, got {parameter.value}")
@@ -197,10 +198,10 @@ class Command:
             parts.append(f"{self.repeated_parameter.describe()}...")
         return " ".join([self.header, ",".join(parts)]).strip()
 
-    def call(self, given: Sequence[Parameter], suffix: int, client: Any) -> Call:
+    def call(self, given: Sequence[Parameter], suffix: int, context: CommandContext) -> Call:
         """Return the call for the parameters of a unit. Raises CommandError."""
         taken = self.parameters if len(given) == len(self.parameters) else self._taken(len(given))
-        values = [kind.read(parameter, client, suffix) for kind, parameter in zip(taken, given, strict=False)]
+        values = [kind.read(parameter, context, suffix) for kind, parameter in zip(taken, given, strict=False)]
         return Call(suffix, tuple(values))
 
     def _taken(self, given: int) -> Sequence[ParameterType]:

@@ -14,7 +14,7 @@ from a7sim.link.clock import WallClock
 POLL_INTERVAL_S = 0.1
 """Interval in s at which a waiting thread checks whether to stop."""
 
-_AT_ONCE = 65536
+_MAX_READ = 65536
 
 
 class RecordingProxy:
@@ -28,24 +28,24 @@ class RecordingProxy:
         self._listener = listener
         self._clock = clock
         self._stop = stop
-        self._one_at_a_time = threading.Lock()
+        self._lock = threading.Lock()
         self._clients = 0
         self._error: A7SimError | None = None
 
-    def serve(self, door: socket.socket) -> None:
+    def serve(self, server_socket: socket.socket) -> None:
         """Serve clients until stopped. Raises A7SimError if the instrument or the listener fails."""
-        door.settimeout(POLL_INTERVAL_S)
+        server_socket.settimeout(POLL_INTERVAL_S)
         while not self._stop.is_set():
             try:
-                client, _ = door.accept()
+                client, _ = server_socket.accept()
             except TimeoutError:
                 continue
             with client:
-                self._let_through(client)
+                self._serve_client(client)
             if self._error is not None:
                 raise self._error
 
-    def _let_through(self, client: socket.socket) -> None:
+    def _serve_client(self, client: socket.socket) -> None:
         self._clients += 1
         name = f"client{self._clients}"
         client.settimeout(POLL_INTERVAL_S)
@@ -53,19 +53,19 @@ class RecordingProxy:
         with port_errors(self._url):
             port = open_port(self._url, POLL_INTERVAL_S)
             try:
-                self._hear(name, "+", "")
+                self._report(name, "+", "")
                 replies = threading.Thread(
-                    target=self._until_gone, args=(gone, self._replies, port, client, name, gone), daemon=True
+                    target=self._run_until_gone, args=(gone, self._replies, port, client, name, gone), daemon=True
                 )
                 replies.start()
-                self._until_gone(gone, self._lines, client, port, name, gone)
+                self._run_until_gone(gone, self._lines, client, port, name, gone)
                 replies.join()
-                self._hear(name, "-", "")
+                self._report(name, "-", "")
             finally:
                 gone.set()
                 port.close()
 
-    def _until_gone(self, gone: threading.Event, carry: Callable[..., None], *between: Any) -> None:
+    def _run_until_gone(self, gone: threading.Event, carry: Callable[..., None], *between: Any) -> None:
         try:
             carry(*between)
         except A7SimError as error:
@@ -80,7 +80,7 @@ class RecordingProxy:
         come, too_long = b"", False
         while not gone.is_set() and not self._stop.is_set():
             try:
-                more = client.recv(_AT_ONCE)
+                more = client.recv(_MAX_READ)
             except TimeoutError:
                 continue
             if not more:
@@ -88,9 +88,9 @@ class RecordingProxy:
             *lines, come = (come + more).split(b"\n")
             for line in lines:
                 if too_long or len(line.removesuffix(b"\r")) > MAX_LINE_LENGTH:
-                    self._hear(name, "!", f"(a line of more than {MAX_LINE_LENGTH} bytes)")
+                    self._report(name, "!", f"(a line of more than {MAX_LINE_LENGTH} bytes)")
                 elif line.strip(b" \t\r"):
-                    self._hear(name, ">", redact_token(line.removesuffix(b"\r").decode("latin-1"), None))
+                    self._report(name, ">", redact_token(line.removesuffix(b"\r").decode("latin-1"), None))
                 port.write(line + b"\n")
                 too_long = False
             if len(come) > MAX_LINE_LENGTH + 1:
@@ -102,9 +102,9 @@ class RecordingProxy:
         while True:
             more = port.read(max(1, port.in_waiting))
             come += more
-            while (taken := _taken(come)) is not None:
+            while (taken := _first_reply(come)) is not None:
                 text, length = taken
-                self._hear(name, "<", text)
+                self._report(name, "<", text)
                 try:
                     client.sendall(bytes(come[:length]))
                 except OSError:  # the client is gone; the line to the instrument is not broken
@@ -113,22 +113,22 @@ class RecordingProxy:
             if not more and (gone.is_set() or self._stop.is_set()):
                 return
 
-    def _hear(self, client: str, direction: str, text: str) -> None:
-        with self._one_at_a_time:
+    def _report(self, client: str, direction: str, text: str) -> None:
+        with self._lock:
             self._listener(LinkEvent(self._clock.now, client, direction, text))
 
 
-def _taken(come: bytearray) -> tuple[str, int] | None:
+def _first_reply(come: bytearray) -> tuple[str, int] | None:
     """Return the text of the first complete reply and its length in bytes."""
     try:
         taken = parse_reply(come)
     except MalformedReplyError:
         end = come.find(b"\n") + 1
         return (come[: end - 1].decode("latin-1"), end) if end else None
-    return None if taken is None else (";".join(map(_heard, taken.parts)), taken.length)
+    return None if taken is None else (";".join(map(_recorded_text, taken.parts)), taken.length)
 
 
-def _heard(part: Part) -> str:
+def _recorded_text(part: Part) -> str:
     if isinstance(part, str):
         return part
     length = str(len(part))

@@ -40,24 +40,24 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._host = host
         self._buffer = buffer
         self._transport: asyncio.Transport
-        self._conversation: ClientSession | None = None
+        self._session: ClientSession | None = None
         self._answered = False
 
-    # --- what asyncio tells ---------------------------------------------------------------------------
+    # --- events of asyncio ----------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Start a session, or reject the client."""
         self._transport = cast(asyncio.Transport, transport)
         self._socket = self._transport.get_extra_info("socket")
         self._transport.set_write_buffer_limits(high=MAX_UNREAD)
-        welcomed = self._host.accept(self, self.serial)
-        if isinstance(welcomed, ClientSession):
-            self._conversation = welcomed
+        accepted = self._host.accept(self, self.serial)
+        if isinstance(accepted, ClientSession):
+            self._session = accepted
         else:
-            self._turn_away(welcomed)
+            self._reject(accepted)
 
-    def _turn_away(self, why: bytes) -> None:
-        self.write(why)
+    def _reject(self, reason: bytes) -> None:
+        self.write(reason)
         with suppress(OSError):
             self._transport.write_eof()
         asyncio.get_running_loop().call_later(FAREWELL, self._transport.abort)
@@ -71,9 +71,9 @@ class TcpConnection(asyncio.BufferedProtocol):
         self._take(self._buffer[:nbytes].tobytes())
 
     def _take(self, data: bytes) -> None:
-        if self._conversation is not None:
+        if self._session is not None:
             self._answered = False
-            self._conversation.data_received(data)
+            self._session.data_received(data)
             if not self._answered:
                 self._acknowledge()
 
@@ -88,29 +88,29 @@ class TcpConnection(asyncio.BufferedProtocol):
 
     def eof_received(self) -> bool:
         """Keep the connection until all is answered."""
-        if self._conversation is None:
+        if self._session is None:
             return False
-        self._conversation.eof_received()
+        self._session.eof_received()
         return True
 
     def connection_lost(self, exc: Exception | None) -> None:
         """End the session."""
-        if self._conversation is not None:
-            self._conversation.connection_lost()
-            self._conversation = None
+        if self._session is not None:
+            self._session.connection_lost()
+            self._session = None
         self._host.release(self)
 
     def pause_writing(self) -> None:
         """Report that the client does not read."""
-        if self._conversation is not None:
-            self._conversation.pause_writing()
+        if self._session is not None:
+            self._session.pause_writing()
 
     def resume_writing(self) -> None:
         """Report that the client reads again."""
-        if self._conversation is not None:
-            self._conversation.resume_writing()
+        if self._session is not None:
+            self._session.resume_writing()
 
-    # --- what the conversation asks -------------------------------------------------------------------
+    # --- requests of the session ----------------------------------------------------------------------
 
     def write(self, data: bytes) -> None:
         """Send bytes, unless the connection is closed."""

@@ -34,9 +34,9 @@ class PtyConnection:
         self._host = host
         self._link = link
         self._unsent = bytearray()
-        self._clogged = False
+        self._write_blocked = False
         self._reading = False
-        self._courtesy = YieldPolicy()
+        self._yield_policy = YieldPolicy()
         self._loop = asyncio.get_running_loop()
         self._near, self._far = os.openpty()
         tty.setraw(self._far)
@@ -48,20 +48,20 @@ class PtyConnection:
         except BaseException:
             self._close_ends()
             raise
-        self._conversation = self._welcomed()
+        self._session = self._start_session()
         self.resume_reading()
 
-    def _welcomed(self) -> ClientSession:
-        welcomed = self._host.accept(self, serial=True)
-        if isinstance(welcomed, bytes):
+    def _start_session(self) -> ClientSession:
+        accepted = self._host.accept(self, serial=True)
+        if isinstance(accepted, bytes):
             raise A7SimError(
-                f"--pty: expected fewer lines than clients are allowed: {welcomed.decode('ascii').strip()}"
+                f"--pty: expected fewer lines than clients are allowed: {accepted.decode('ascii').strip()}"
             )
-        return welcomed
+        return accepted
 
     def remove(self) -> None:
         """Remove link and terminal."""
-        self._conversation.connection_lost()
+        self._session.connection_lost()
         self.pause_reading()
         self._loop.remove_writer(self._near)
         if self._link.is_symlink() and str(self._link.readlink()) == self.device:
@@ -73,12 +73,12 @@ class PtyConnection:
         os.close(self._far)
 
     def _readable(self) -> None:
-        near, received = self._near, self._conversation.data_received
+        near, received = self._near, self._session.data_received
         for _ in range(POLLS_BEFORE_SLEEP):
             try:
                 data = os.read(near, MAX_READ)
             except (BlockingIOError, InterruptedError):
-                if not self._courtesy.yield_cpu():
+                if not self._yield_policy.yield_cpu():
                     return
             else:
                 received(data)
@@ -86,33 +86,33 @@ class PtyConnection:
                     return
 
     def _writable(self) -> None:
-        self._unsent = self._unsent[self._sent(self._unsent) :]
+        self._unsent = self._unsent[self._send(self._unsent) :]
         if not self._unsent:
             self._loop.remove_writer(self._near)
-        if self._clogged and len(self._unsent) <= MAX_UNREAD // 4:
-            self._clogged = False
-            self._conversation.resume_writing()
+        if self._write_blocked and len(self._unsent) <= MAX_UNREAD // 4:
+            self._write_blocked = False
+            self._session.resume_writing()
 
-    def _sent(self, data: bytes | bytearray) -> int:
+    def _send(self, data: bytes | bytearray) -> int:
         try:
             return os.write(self._near, data)
         except (BlockingIOError, InterruptedError):
             return 0
 
-    # --- what the conversation asks -------------------------------------------------------------------
+    # --- requests of the session ----------------------------------------------------------------------
 
     def write(self, data: bytes) -> None:
         """Send bytes, now or as soon as possible."""
         if not self._unsent:
-            sent = self._sent(data)
+            sent = self._send(data)
             if sent == len(data):
                 return
             data = data[sent:]
             self._loop.add_writer(self._near, self._writable)
         self._unsent += data
-        if not self._clogged and len(self._unsent) > MAX_UNREAD:
-            self._clogged = True
-            self._conversation.pause_writing()
+        if not self._write_blocked and len(self._unsent) > MAX_UNREAD:
+            self._write_blocked = True
+            self._session.pause_writing()
 
     def pause_reading(self) -> None:
         """Stop receiving."""
@@ -131,13 +131,13 @@ class PtyConnection:
 
     def abort(self) -> None:
         """Discard the client and all bytes on the line, and start a new session."""
-        self._conversation.connection_lost()
+        self._session.connection_lost()
         self._host.release(self)
         self._loop.remove_writer(self._near)
         self._unsent.clear()
-        self._clogged = False
+        self._write_blocked = False
         termios.tcflush(self._far, termios.TCIOFLUSH)
-        self._conversation = self._welcomed()
+        self._session = self._start_session()
         self.resume_reading()
 
 

@@ -20,7 +20,7 @@ MAX_REJECTION_NOTICES = 64
 """Number of clients at a time that get the reason of their rejection; further ones are only disconnected."""
 
 LISTEN_BACKLOG = 512
-"""Connections that may wait to be accepted, and are accepted before the clients have their turn."""
+"""Connections that may wait to be accepted, and are accepted before commands of clients are executed."""
 
 
 @dataclass(frozen=True)
@@ -41,16 +41,16 @@ class Server:
         self._terms = terms
         self._buffer = memoryview(bytearray(MAX_READ))
         self._wires: set[Transport] = set()
-        self._turned_away: set[Transport] = set()
+        self._rejected: set[Transport] = set()
         self._listeners: list[asyncio.Server] = []
         self._terminals: list[PtyConnection] = []
 
-    async def open(self, doors: Endpoints) -> list[dict[str, Any]]:
+    async def open(self, endpoints: Endpoints) -> list[dict[str, Any]]:
         """Open all endpoints and return their description as a document. Raises A7SimError, and then none is open."""
         try:
-            opened = [await self._listen("tcp", TcpConnection, address) for address in doors.tcp]
-            opened += [await self._listen("rfc2217", TelnetConnection, address) for address in doors.rfc2217]
-            opened += [self._lay(path) for path in doors.pty]
+            opened = [await self._listen("tcp", TcpConnection, address) for address in endpoints.tcp]
+            opened += [await self._listen("rfc2217", TelnetConnection, address) for address in endpoints.rfc2217]
+            opened += [self._open_terminal(path) for path in endpoints.pty]
         except BaseException:
             await self.close()
             raise
@@ -68,7 +68,7 @@ class Server:
         host, port = listener.sockets[0].getsockname()[:2]
         return {"kind": kind, "host": host, "port": port, "url": f"{kind}://{Address(host, port)}"}
 
-    def _lay(self, path: Path) -> dict[str, Any]:
+    def _open_terminal(self, path: Path) -> dict[str, Any]:
         terminal = PtyConnection(self, path)
         self._terminals.append(terminal)
         return {"kind": "pty", "path": str(path), "device": terminal.device, "url": str(path)}
@@ -81,7 +81,7 @@ class Server:
             terminal.remove()
             self._wires.discard(terminal)
         self._terminals.clear()
-        for wire in [*self._wires, *self._turned_away]:
+        for wire in [*self._wires, *self._rejected]:
             wire.abort()
         await asyncio.sleep(0)
 
@@ -92,12 +92,14 @@ class Server:
 
     def accept(self, wire: Transport, serial: bool) -> ClientSession | bytes:
         """Return a session for a transport, or the reason for a rejection, as a line."""
-        most = self._terms.max_clients
-        if len(self._wires) >= most:
-            if len(self._turned_away) >= MAX_REJECTION_NOTICES:
+        max_clients = self._terms.max_clients
+        if len(self._wires) >= max_clients:
+            if len(self._rejected) >= MAX_REJECTION_NOTICES:
                 wire.abort()
-            self._turned_away.add(wire)
-            text = format_entry(ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(most, 'client')} at a time")
+            self._rejected.add(wire)
+            text = format_entry(
+                ErrorNumber.EXECUTION_ERROR, f"expected at most {pluralize(max_clients, 'client')} at a time"
+            )
             return f"{text}\n".encode("ascii")
         self._wires.add(wire)
         return ClientSession(self.instrument, self._clock, self._terms, wire, self.instrument.client_count + 1, serial)
@@ -105,7 +107,7 @@ class Server:
     def release(self, wire: Transport) -> None:
         """Record that a transport is closed."""
         self._wires.discard(wire)
-        self._turned_away.discard(wire)
+        self._rejected.discard(wire)
 
 
 def _reason(error: OSError) -> str:

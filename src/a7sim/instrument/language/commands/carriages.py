@@ -11,7 +11,7 @@ from a7sim.instrument.language.table import (
 )
 
 MAX_READING = 999999.99
-"""Of a counter's drums."""
+"""Maximum reading of a counter."""
 
 
 def _counters(engine: CommandContext, call: Call) -> str:
@@ -19,7 +19,7 @@ def _counters(engine: CommandContext, call: Call) -> str:
 
 
 def _axis(axis: str) -> list[Command]:
-    usual = "" if axis == "Z" else "mm"
+    default_unit = "" if axis == "Z" else "mm"
 
     def unit(engine: CommandContext) -> str:
         return autograph_for(engine).variant.scales[axis].unit
@@ -29,11 +29,11 @@ def _axis(axis: str) -> list[Command]:
         low, high = autograph.counter_limits(axis)
         return low, high, autograph.counter_at_rest(axis)
 
-    def to_the_ends(engine: CommandContext, suffix: int) -> Limits:
+    def amount_limits(engine: CommandContext, suffix: int) -> Limits:
         autograph = autograph_for(engine)
         low, high = autograph.counter_limits(axis)
-        here = autograph.counter(axis)
-        return low - here, high - here, 0.0
+        reading = autograph.counter(axis)
+        return low - reading, high - reading, 0.0
 
     def preset_limits(engine: CommandContext, suffix: int) -> Limits:
         return -MAX_READING, MAX_READING, 0.0
@@ -56,28 +56,28 @@ def _axis(axis: str) -> list[Command]:
         Command(
             f"COUNter:{axis}:PRESet",
             preset,
-            (Quantity(usual, preset_limits, name="reading", unit_there=unit),),
+            (Quantity(default_unit, preset_limits, name="reading", instrument_unit=unit),),
             moves=True,
-            help="what the counter shall show here",
+            help="set the counter to a reading; nothing moves",
         ),
         Command(
             f"DRIVe:{axis}",
             drive,
-            (Quantity(usual, limits, name="reading", unit_there=unit),),
+            (Quantity(default_unit, limits, name="reading", instrument_unit=unit),),
             moves=True,
-            help="run to a counter reading",
+            help="drive to a counter reading",
         ),
         Command(
             f"WHEel:{axis}",
             wheel,
-            (Quantity(usual, to_the_ends, name="amount", unit_there=unit),),
+            (Quantity(default_unit, amount_limits, name="amount", instrument_unit=unit),),
             moves=True,
-            help="turn by a signed counter amount",
+            help="turn the wheel by a signed counter amount",
         ),
     ]
 
 
 CARRIAGES = [
-    Command("COUNter?", _counters, help="X, Y and Z"),
+    Command("COUNter?", _counters, help="X, Y and Z counters"),
     *(command for axis in "XYZ" for command in _axis(axis)),
 ]

@@ -37,10 +37,10 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
     def turn(engine: CommandContext, call: Call) -> None:
         autograph_for(engine).turn_element(name_of(call.suffix), call.arguments[0])
 
-    def to_the_ends(engine: CommandContext, suffix: int) -> Limits:
+    def amount_limits(engine: CommandContext, suffix: int) -> Limits:
         low, high, _ = limits(engine, suffix)
-        here = autograph_for(engine).element(name_of(suffix))
-        return low - here, high - here, 0.0
+        reading = autograph_for(engine).element(name_of(suffix))
+        return low - reading, high - reading, 0.0
 
     def show(engine: CommandContext, call: Call) -> str:
         shown = autograph_for(engine).element(name_of(call.suffix))
@@ -54,9 +54,9 @@ def _element(header: str, name_of: Callable[[int], str], unit: str, about: str) 
         Command(
             f"{header}:TURN",
             turn,
-            (Quantity(unit, to_the_ends, name="amount"),),
+            (Quantity(unit, amount_limits, name="amount"),),
             moves=True,
-            help="turn its drum by a signed amount, between two counts too",
+            help="turn the drum by a signed amount, also less than a count",
         ),
     ]
 
@@ -116,7 +116,7 @@ ELEMENT_COMMANDS = [
         _height_gear,
         (QuotedOrNumber("combination"),),
         moves=True,
-        help="height gear, or units a mm",
+        help="height gear, or its units per mm",
     ),
     Command("GEAR:HEIGht?", lambda e, c: _gear_text(autograph_for(e).height_gear)),
     Command(

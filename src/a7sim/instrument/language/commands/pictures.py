@@ -90,9 +90,13 @@ def _picture(engine: CommandContext, call: Call) -> bytes:
 
 PICTURES = [
     Command("PHOTo<n>:LOAD", _load, (Quoted("picture"),), moves=True, help="lay a picture on the carrier"),
-    Command("PHOTo<n>:UNLoad", _unload, moves=True, help="take it off"),
-    Command("PHOTo<n>?", lambda e, c: quote_text(autograph_for(e).loaded(c.suffix) or ""), help="its name"),
-    Command("PHOTo:CATalog?", _catalogue, help="the pictures at hand"),
+    Command("PHOTo<n>:UNLoad", _unload, moves=True, help="remove the picture from the carrier"),
+    Command(
+        "PHOTo<n>?",
+        lambda e, c: quote_text(autograph_for(e).loaded(c.suffix) or ""),
+        help="name of the picture, empty without one",
+    ),
+    Command("PHOTo:CATalog?", _catalogue, help="names of all available pictures"),
     Command(
         "PHOTo<n>:CENTring",
         _centre,
@@ -102,7 +106,7 @@ PICTURES = [
             Quantity("gon", _centring_limits("centring_gon"), name="dkappa"),
         ),
         moves=True,
-        help="shift and turn the picture from where it was laid",
+        help="shift and turn the picture from its initial position",
     ),
     Command("PHOTo<n>:CENTring?", _centring),
     Command(

@@ -86,16 +86,18 @@ RECORDING = [
         "RECord?",
         _numbered_record,
         (Quantity(whole=True, name="number"),),
-        help="a registration as it stands: number, point, X, Y, Z and element,reading ...",
+        help="a registration: number, point, X, Y, Z and element,reading ...",
     ),
-    Command("RECord:LAST?", _last_record, help="number, point, X, Y, Z and element,reading ..."),
-    Command("RECord:COUNt?", lambda e, c: str(len(autograph_for(e).recorder.registrations)), help="registrations"),
+    Command("RECord:LAST?", _last_record, help="last registration: number, point, X, Y, Z and element,reading ..."),
+    Command(
+        "RECord:COUNt?", lambda e, c: str(len(autograph_for(e).recorder.registrations)), help="number of registrations"
+    ),
     Command(
         "RECord:STRike",
         _strike,
         (Quantity(whole=True, name="number"), Quoted("why")),
-        help="strike a registration out; it stays, marked",
+        help="strike a registration out; it remains, marked as struck",
     ),
-    Command("RECord:STRike:COUNt?", _struck_records, help="registrations that are struck out"),
-    Command("NOTE", _note, (Quoted("text"),), help="a remark into the journal"),
+    Command("RECord:STRike:COUNt?", _struck_records, help="number of registrations struck out"),
+    Command("NOTE", _note, (Quoted("text"),), help="write a remark into the journal"),
 ]
