@@ -1,4 +1,4 @@
-"""The A8 at the link: scales about 200, a base laid off both ways, a common Phi, and what it has not (P 3.1, 3.2)."""
+"""The A8 over the link: scales about 200, a base laid off both ways, common phi, parts it lacks (P 3.1, 3.2)."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def an_a8(**photographs) -> EngineClient:
     return EngineClient(SharedInstrument(Autograph(A8, photographs=photographs)))
 
 
-def test_it_says_that_it_is_an_a8():
+def test_the_identification_query_names_an_a8():
     assert an_a8().query("*IDN?") == f"WILD HEERBRUGG,A8,0,{a7sim.__version__}"
 
 
@@ -49,14 +49,14 @@ def test_it_says_that_it_is_an_a8():
         'REC "1",BY1',
     ],
 )
-def test_what_it_has_not_is_a_settings_conflict(line):
+def test_a_part_that_an_a8_lacks_is_a_settings_conflict(line):
     client = an_a8()
     assert client.query(line) == ""
     assert client.errors() == [-221]
 
 
-def test_what_it_has_not_is_what_its_data_do_not_list():
-    """An A7 whose table had no by is refused it, an A8 whose table had one sets it: no name decides anything."""
+def test_a_part_is_lacking_if_the_data_of_the_plotter_do_not_list_it():
+    """An A7 without by in its table refuses by, an A8 with by in its table sets it: the table decides, not the name."""
     with_by = replace(A8, elements={**A8.elements, "by1": A7.elements["by1"]}, fittings=A7.fittings)
     client = EngineClient(SharedInstrument(Autograph(with_by)))
     assert client.query("PROJ1:BY 1.5;:PROJ1:BY?;:FITT:DOVE?") == "1.50;OUT"
@@ -81,11 +81,11 @@ def test_what_it_has_not_is_what_its_data_do_not_list():
         ("DRIV:X 180;:COUN:X:PRES 1;:SYST:ERR:COUN?;:*RST;:COUN:X?", "1;180.00"),
     ],
 )
-def test_its_scales_and_elements_answer_at_the_door(line, reply):
+def test_scales_and_elements_answer_over_the_link(line, reply):
     assert an_a8().query(line) == reply
 
 
-def test_a_reading_of_its_scales_is_no_length():
+def test_a_scale_reading_accepts_no_unit_of_length():
     client = an_a8()
     client.query("DRIV:X 180 MM")
     assert client.errors() == [-138]
@@ -93,7 +93,7 @@ def test_a_reading_of_its_scales_is_no_length():
 
 
 @given(st.sampled_from("XY"), st.floats(-50.0, 50.0))
-def test_a_unit_of_its_scales_is_2_mm_of_the_model(axis, amount):
+def test_a_unit_of_the_scales_is_2_mm_of_the_model(axis, amount):
     a8 = Autograph(A8)
     a8.turn_handwheel(axis, amount)
     moved = a8.mark_in_model()["XY".index(axis)]
@@ -102,7 +102,7 @@ def test_a_unit_of_its_scales_is_2_mm_of_the_model(axis, amount):
 
 
 @given(st.sampled_from(sorted(A8.elements)), st.floats(0.0, 1.0))
-def test_every_element_it_has_reads_back_what_it_was_set_to(name, share):
+def test_every_element_of_an_a8_reads_back_the_value_that_was_set(name, share):
     element, a8 = A8.elements[name], Autograph(A8)
     value = round(element.low + share * (element.high - element.low), 2)
     a8.set_element(name, value)
@@ -110,7 +110,7 @@ def test_every_element_it_has_reads_back_what_it_was_set_to(name, share):
 
 
 @given(st.floats(10.0, 280.0))
-def test_the_base_line_reads_200_and_the_left_centre_stands_at_200_less_a_quarter_of_the_base(base):
+def test_the_base_line_reads_200_and_the_left_centre_is_at_200_less_a_quarter_of_the_base(base):
     a8 = Autograph(A8)
     a8.set_element("bx", base)
     shown = a8.element("bx")
@@ -119,8 +119,8 @@ def test_the_base_line_reads_200_and_the_left_centre_stands_at_200_less_a_quarte
     assert right == pytest.approx({"X": 200.0 + shown / 4.0, "Y": 200.0, "Z": 0.0})
 
 
-def test_the_middle_of_the_base_of_a_worked_setting():
-    """G:1048639142/410 has it at X 180.1, Y 200.1 for bx 80: the left centre, by P's rule 200 - 80/4."""
+def test_the_left_centre_of_a_documented_setting_agrees_with_the_rule():
+    """G:1048639142/410 gives X 180.1, Y 200.1 for bx 80: the left centre, by P's rule 200 - 80/4."""
     a8 = Autograph(A8)
     a8.set_element("bx", 80.0)
     left = a8.readings_at(a8.pose(1)[0])
@@ -136,13 +136,13 @@ def test_common_phi_turns_both_projectors_and_the_base_about_the_y_axis(common, 
     turned.set_element("common_phi", common)
     frame = rotation(0.0, (turned.element("common_phi") - 100.0) * GON, 0.0)
     for n in (1, 2):
-        (centre, camera), (there, then) = level.pose(n), turned.pose(n)
-        np.testing.assert_allclose(there, frame @ centre, atol=1e-9)
-        np.testing.assert_allclose(then, frame @ camera, atol=1e-12)
+        (centre, camera), (turned_centre, turned_camera) = level.pose(n), turned.pose(n)
+        np.testing.assert_allclose(turned_centre, frame @ centre, atol=1e-9)
+        np.testing.assert_allclose(turned_camera, frame @ camera, atol=1e-12)
 
 
 def test_common_phi_changes_no_parallax_and_levels_a_model():
-    """Where the mark follows the frame's turn, both eyes see what they saw: the model turns as a body."""
+    """If the mark follows the turn of the frame, both eyepieces show the same view: the model turns as a body."""
     points = {str(i): place for i, place in enumerate(GROUND.T)}
     pictures = _pictures_of(points, (0.6, -0.4, 1.0), (-0.5, 0.7, -2.0))
     a8 = _set_up(pictures, (0.6, -0.4, 1.0), (-0.5, 0.7, -2.0))
@@ -183,7 +183,7 @@ def _set_up(pictures, *tilts) -> Autograph:
 
 
 def test_readings_of_a_model_become_its_coordinates_by_the_rules_of_p():
-    """P 3.1 and 3.2 from the door: the mark set on every point, the scales read, the left centre at the origin."""
+    """P 3.1 and 3.2 over the link: set the mark on every point, read the scales, put the left centre at the origin."""
     points = {str(i): place for i, place in enumerate(GROUND.T)}
     tilts = (0.6, -0.4, 1.0), (-0.5, 0.7, -2.0)
     client = EngineClient(SharedInstrument(_set_up(_pictures_of(points, *tilts), *tilts)))
@@ -203,8 +203,8 @@ def test_readings_of_a_model_become_its_coordinates_by_the_rules_of_p():
     assert client.errors() == []
 
 
-def test_a_negative_is_seen_as_it_is_with_the_fittings_that_it_has():
-    """What an A8 has no fitting for is built right: neither Dove index nor triangulation lever mirror anything."""
+def test_a_negative_is_seen_unmirrored_with_the_fittings_of_an_a8():
+    """An A8 has no Dove index and no triangulation lever, so neither mirrors the view."""
     a8 = Autograph(A8, photographs={"L": photograph("L", {"P": (1.0, 2.0)}, polarity="negative")})
     a8.load(1, "L")
     a8.set_fitting("diapositive", "right")
@@ -215,7 +215,7 @@ def test_a_negative_is_seen_as_it_is_with_the_fittings_that_it_has():
     assert a8.eyepiece(1, "P")[1] == pytest.approx(1500.0)
 
 
-def test_an_a8_opens_on_the_serial_line_with_its_pictures():
+def test_an_a8_opens_as_a_serial_port_with_its_pictures():
     with serial_for_url("a7sim://a8-strip?seed=3", timeout=1) as port:
         port.write(b'*IDN?;:PHOT:CAT?;:COUN?\nPHOT1:LOAD "201";:PHOT1?;:SYST:ERR?\n')
         identity, pictures, counters = port.readline().decode("ascii").strip().split(";")
@@ -225,7 +225,7 @@ def test_an_a8_opens_on_the_serial_line_with_its_pictures():
         assert port.readline() == b'"201";0,"No error"\n'
 
 
-def test_with_common_phi_the_rods_keep_their_reach():
+def test_the_rods_of_an_a8_have_a_limited_reach():
     client = an_a8()
     client.query("BASE:BX 200;:DRIV:Z -175;:DRIV:X 320")
     assert client.errors() == [-222]

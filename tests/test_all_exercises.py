@@ -13,6 +13,6 @@ EXERCISES = [
 
 
 @pytest.mark.parametrize("entry", EXERCISES)
-def test_every_exercise_holds_what_check_asks(entry):
-    """The reference passes, every faulty script fails for its reason, no criterion is without effect."""
+def test_every_exercise_passes_its_check(entry):
+    """The reference passes, every faulty script fails for its reason, and every criterion has an effect."""
     assert_exercise_holds(entry)

@@ -1,4 +1,4 @@
-"""All benchmarks are run together and told in one shape, and one that fails does not stop the others (issue 10)."""
+"""All benchmarks run together and are reported in one form; a failing one does not stop the others (issue 10)."""
 
 import datetime
 import os
@@ -32,7 +32,7 @@ SURROUNDINGS = {
 }
 
 HELPERS = {"echoes", "round_trips", "bench", "mutants"}
-"""Programs that measure nothing by themselves, or measure the tests."""
+"""Programs that measure nothing alone, or that measure the tests."""
 
 
 def page_of(*outcomes, load=0.1, full=False):
@@ -56,12 +56,12 @@ def test_every_program_that_measures_is_in_the_readme():
     assert listed == {each.program for each in bench.BENCHMARKS} | {"bench"}
 
 
-def test_quick_settings_end_in_minutes_and_never_take_longer_than_the_full_ones():
+def test_quick_settings_end_in_minutes_and_take_no_longer_than_full_settings():
     assert sum(each.quick.seconds for each in bench.BENCHMARKS) < 15 * 60
     assert all(each.quick.seconds <= each.full.seconds for each in bench.BENCHMARKS)
 
 
-def test_recorded_figures_come_back_as_they_were():
+def test_recorded_figures_survive_writing_and_reading():
     recorded = figures.read(RECORDED)
     assert figures.read(figures.written(recorded)) == recorded
 
@@ -80,7 +80,7 @@ def test_a_page_has_a_row_for_each_recorded_figure():
     assert "python benchmarks/links.py --rounds 20\n" in page
 
 
-def test_a_page_says_what_failed_and_what_was_not_there():
+def test_a_page_names_failed_benchmarks_and_absent_libraries():
     failed = bench_page.Outcome("killed", "20", failure="expected a|b, got <nothing>")
     absent = bench_page.Outcome("fuzz_guided", "", absent="atheris")
     page = page_of(failed, absent)
@@ -89,7 +89,7 @@ def test_a_page_says_what_failed_and_what_was_not_there():
     assert "benchmarks that failed: 1." in page
 
 
-def test_a_page_says_whether_other_work_went_on_and_with_which_settings():
+def test_a_page_states_whether_other_programs_were_running_and_which_settings_were_used():
     assert "Taken beside other work" in page_of(load=1.8)
     assert "Taken beside other work" not in page_of(load=0.1)
     assert "quick settings" in page_of()
@@ -104,7 +104,7 @@ def test_a_page_says_whether_other_work_went_on_and_with_which_settings():
         ("--full --peers /some/where", "make bench BENCH='--full --peers DIR'", ""),
     ],
 )
-def test_a_page_says_the_command_that_gives_it_again(arguments, command, settings):
+def test_a_page_names_the_command_that_reproduces_it(arguments, command, settings):
     given = bench.options(arguments.split())
     chosen = {each.program: used.arguments for each, used in bench.chosen_by(given)}
     assert bench.command_of(given) == command
@@ -112,7 +112,7 @@ def test_a_page_says_the_command_that_gives_it_again(arguments, command, setting
     assert set(chosen) == set(given.only or [each.program for each in bench.BENCHMARKS])
 
 
-def test_a_page_names_neither_the_machine_nor_a_path_of_it():
+def test_a_page_contains_neither_the_name_nor_a_path_of_the_machine():
     page = bench_page.page([bench_page.Outcome("run", "")], bench_page.Surroundings.here(), "make bench", False)
     assert os.uname().nodename not in page
     assert str(BENCHMARKS.parent) not in page
@@ -135,8 +135,8 @@ def test_a_target_is_met_up_to_its_limit(target, meets, misses):
 
 
 @pytest.fixture
-def tried(monkeypatch, tmp_path):
-    """Return what comes of a program with this text, to which `figures` is as near as to the benchmarks."""
+def run_program(monkeypatch, tmp_path):
+    """Return a function that runs a program text beside `figures` and returns its outcome."""
     monkeypatch.setattr(bench, "HERE", tmp_path)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(BENCHMARKS), os.environ.get("PYTHONPATH", "")]))
 
@@ -148,8 +148,8 @@ def tried(monkeypatch, tmp_path):
     return outcome
 
 
-def test_a_missed_target_and_what_is_printed_for_people_do_not_make_a_benchmark_fail(tried):
-    come = tried(
+def test_a_benchmark_with_a_missed_target_or_printed_text_does_not_fail(run_program):
+    result = run_program(
         "import os, sys\n"
         "from figures import Figure, Target, tell\n"
         "def main():\n"
@@ -159,32 +159,32 @@ def test_a_missed_target_and_what_is_printed_for_people_do_not_make_a_benchmark_
         "tell(main)\n",
         "--rounds 3",
     )
-    assert come.failure == ""
-    assert come.figures == (Figure("--rounds 3", 2.0, target=Target("below", 1)),)
-    assert come.summary.endswith("0 met, 1 missed")
+    assert result.failure == ""
+    assert result.figures == (Figure("--rounds 3", 2.0, target=Target("below", 1)),)
+    assert result.summary.endswith("0 met, 1 missed")
 
 
-def test_a_benchmark_that_fails_is_told_by_its_last_words(tried):
-    assert tried("raise SystemExit('expected a port, got none')").failure == "expected a port, got none"
-    assert tried("raise SystemExit(3)").failure == "exit code 3, and nothing said"
+def test_a_failed_benchmark_is_reported_with_its_last_words(run_program):
+    assert run_program("raise SystemExit('expected a port, got none')").failure == "expected a port, got none"
+    assert run_program("raise SystemExit(3)").failure == "exit code 3, and nothing said"
 
 
-def test_a_benchmark_that_takes_too_long_is_ended_with_all_that_it_started(tried, monkeypatch, tmp_path):
+def test_a_benchmark_over_its_time_limit_is_ended_with_its_child_processes(run_program, monkeypatch, tmp_path):
     monkeypatch.setattr(bench.Settings, "longest", 2.0)
     monkeypatch.setattr(bench, "SECONDS_TO_END", 0.5)
-    come = tried(
+    result = run_program(
         "import subprocess, pathlib, time\n"
         "child = subprocess.Popen(['sleep', '60'])\n"
         f"pathlib.Path({str(tmp_path / 'child')!r}).write_text(str(child.pid))\n"
         "time.sleep(60)\n"
     )
-    assert come.failure == "not done after 2 s"
+    assert result.failure == "not done after 2 s"
     child = int((tmp_path / "child").read_text())
-    assert is_gone(child)
+    assert has_ended(child)
 
 
-def is_gone(process):
-    """Whether a process has ended, be it that nobody has taken note of it yet."""
+def has_ended(process):
+    """Return whether a process has ended; a zombie counts as ended."""
     try:
         return Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()[0] in "ZX"
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""Bridging: what must go on from model to model does, and the strip closes as well as its counters allow."""
+"""Bridging: settings and readings continue from model to model, and the strip closes within its counters."""
 
 import json
 from itertools import pairwise
@@ -26,32 +26,34 @@ CLOSES_MM = 0.05
 
 
 def scenario_of(models, **overrides):
-    """The first so many models of the strip without signalised points, film and operator without errors: so that
-    nothing need be read twice."""
+    """Return a scenario of the first `models` models of the strip, with film and operator without errors.
+
+    It has no signalised points, and no reading needs to be repeated.
+    """
     scenario = without_errors(load_scenario("bridge", {"plan.parallax_readings": "1", **overrides}))
     return msgspec.structs.replace(scenario, models=scenario.models[:models], ground=[])
 
 
-def worked(scenario, seeds=(1,)):
+def bridged_strip(scenario, seeds=(1,)):
     batch = open_batch(scenario, seeds)
     return batch, list(bridge_strip_batch(batch.workstation))
 
 
-def misclosures(crowd, models, session=0):
-    """How far a strip ``(3, n)`` in mm lies from the true ground, carried onto it by a similarity."""
+def misclosures(batch, models, session=0):
+    """Return the residuals ``(3, n)`` in mm of a strip after a similarity transformation to the true ground."""
     strip = strip_points([model.coordinates_of(session) for model in models])
-    ground = np.array([crowd.scenes[session].ground_points[name] for name in strip.points]).T
+    ground = np.array([batch.scenes[session].ground_points[name] for name in strip.points]).T
     return similarity_by_quaternion(ground, strip.coordinates).residuals
 
 
 @pytest.fixture(scope="module")
-def three():
-    return worked(scenario_of(3))
+def three_models():
+    return bridged_strip(scenario_of(3))
 
 
-def test_the_oriented_photograph_stays_as_it_is(three):
-    """Kappa, phi, omega, by and bz of the photograph that two models share are the same in both."""
-    _, models = three
+def test_a_photograph_keeps_its_elements_in_the_next_model(three_models):
+    """Two models that share a photograph have the same kappa, phi, omega, by and bz of it."""
+    _, models = three_models
     for before, after in pairwise(models):
         n = before.model.right_projector
         assert after.model.left_projector == n
@@ -59,9 +61,9 @@ def test_the_oriented_photograph_stays_as_it_is(three):
             assert after.orientation.elements[f"{name}{n}"] == before.orientation.elements[f"{name}{n}"]
 
 
-def test_readings_go_on_from_model_to_model(three):
-    """Common points read the same again, within a count or two in any coordinate."""
-    _, models = three
+def test_readings_of_common_points_continue_from_model_to_model(three_models):
+    """The readings of common points agree within one or two counts in each coordinate."""
+    _, models = three_models
     for model in models[1:]:
         assert len(model.common) >= 3
         for difference in model.common.values():
@@ -69,50 +71,52 @@ def test_readings_go_on_from_model_to_model(three):
             assert max(abs(x), abs(y), abs(z / model.z_units_per_mm)) < 0.02
 
 
-def test_the_strip_runs_on_over_several_bases(three):
-    """X reads on by one base a model, though the carriage ends at 280 mm."""
-    _, models = three
+def test_x_readings_continue_over_several_bases(three_models):
+    """X increases by one base in each model, although the carriage ends at 280 mm."""
+    _, models = three_models
     first = models[0].points["2011"][0, 0]
     assert models[-1].points["2041"][0, 0] - first == pytest.approx(3 * 194.4, abs=3.0)
 
 
-def test_three_models_close_within_what_is_asked_of_ten(three):
-    crowd, models = three
-    assert np.abs(misclosures(crowd, models)).max() < CLOSES_MM
+def test_three_models_close_within_the_limit_for_ten(three_models):
+    batch, models = three_models
+    assert np.abs(misclosures(batch, models)).max() < CLOSES_MM
 
 
-def test_the_scale_is_carried_by_the_heights_of_common_points(monkeypatch):
-    """The comparison can fail: without the carrying of scale the flying height's changes break the strip."""
-    monkeypatch.setattr(bridging, "transfer_scale", lambda bench, active, model, before: np.ones(bench.operators.size))
-    crowd, models = worked(scenario_of(2))
+def test_without_the_transfer_of_scale_a_strip_does_not_close(monkeypatch):
+    """The comparison can fail: without transfer of scale, changes of the flying height break the strip."""
+    monkeypatch.setattr(
+        bridging, "transfer_scale", lambda workstation, active, model, before: np.ones(workstation.operators.size)
+    )
+    batch, models = bridged_strip(scenario_of(2))
     assert len(models) == 2
-    assert np.abs(misclosures(crowd, models)).max() > 10.0 * CLOSES_MM
+    assert np.abs(misclosures(batch, models)).max() > 10.0 * CLOSES_MM
 
 
-def test_by_and_bz_that_run_out_are_set_back_and_y_and_z_preset(monkeypatch):
-    """With every photograph set back to the zeros of by and bz the strip is the same strip."""
+def test_by_and_bz_at_the_end_of_their_range_are_set_back_and_y_and_z_preset(monkeypatch):
+    """If every photograph is set back to the zeros of by and bz, the strip still closes."""
     monkeypatch.setattr(bridging, "SHARE_OF_RANGE", 0.0)
-    crowd, models = worked(scenario_of(2))
+    batch, models = bridged_strip(scenario_of(2))
     assert len(models) == 2
     for model in models[1:]:
         n = model.model.left_projector
         assert model.orientation.elements[f"by{n}"][0] == 0.0
         assert model.orientation.elements[f"bz{n}"][0] == 0.0
-    assert np.abs(misclosures(crowd, models)).max() < CLOSES_MM
+    assert np.abs(misclosures(batch, models)).max() < CLOSES_MM
 
 
-def test_models_that_do_not_go_on_are_refused():
-    """Base inside twice running: the photograph to be kept would have to change its projector."""
+def test_a_model_that_does_not_continue_the_strip_is_refused():
+    """With the base inside twice in succession, the common photograph would have to change its projector."""
     scenario = scenario_of(2)
     again = msgspec.structs.replace(scenario.models[1], base="inside")
-    crowd, models = worked(msgspec.structs.replace(scenario, models=[scenario.models[0], again]))
+    batch, models = bridged_strip(msgspec.structs.replace(scenario, models=[scenario.models[0], again]))
     assert len(models) == 1
-    assert "does not go on from model 1" in crowd.workstation.operators.reasons[0]
+    assert "does not go on from model 1" in batch.workstation.operators.reasons[0]
 
 
 @pytest.mark.slow
-def test_a_scenario_that_asks_for_a_bridge_gets_it_over_the_link_and_in_a_crowd():
-    """`work = ["bridge"]`: the strip on the ground to the digit, and the hours, as a study reads them."""
+def test_a_bridge_is_the_same_over_the_link_and_in_a_batch():
+    """With `work = ["bridge"]`, the strip on the ground and the hours are equal to the digit."""
     settings = load_study("bridging").cells[5].settings
     scenario = without_errors(load_scenario("bridge", settings=settings))
     assert scenario.work == ["bridge"]
@@ -126,8 +130,8 @@ def test_a_scenario_that_asks_for_a_bridge_gets_it_over_the_link_and_in_a_crowd(
 
 
 @pytest.mark.slow
-def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
-    """Whoever gives up has no strip, and the document says so."""
+def test_the_reason_for_giving_up_a_bridge_is_reported_over_the_link_and_in_a_batch(monkeypatch):
+    """An operator that gives up has no strip; the document contains the reason."""
     monkeypatch.setattr(bridging, "transfer_scale", _gives_up)
     scenario = msgspec.structs.replace(scenario_of(2), work=["bridge"])
     for document in (run_all_methods(scenario, 1), *run_all_methods_batch(scenario, [1])):
@@ -135,12 +139,12 @@ def test_a_bridge_that_does_not_close_says_why_in_both(monkeypatch):
         assert "ways" not in document
 
 
-def _gives_up(bench, active, model, before):
-    bench.operators.give_up(active, "no scale")
+def _gives_up(workstation, active, model, before):
+    workstation.operators.give_up(active, "no scale")
     raise AllGaveUpError
 
 
-def test_a_scenario_without_base_out_cannot_ask_for_a_bridge():
+def test_bridging_in_a_scenario_without_base_out_is_a_mistake():
     with pytest.raises(ScenarioError, match="base inside and outside in turn"):
         load_scenario("a8-strip", {"work": '["bridge"]'})
 
@@ -152,37 +156,37 @@ def test_a_strip_without_base_out_cannot_be_bridged():
 
 @pytest.mark.slow
 def test_ten_models_close_on_the_truth():
-    """Within 0.05 mm at every point is asked; drums that are turned by eye between two counts leave 0.01."""
-    crowd, models = worked(scenario_of(10))
+    """The requirement is 0.05 mm at every point; drums turned by eye between two counts leave 0.01."""
+    batch, models = bridged_strip(scenario_of(10))
     assert len(models) == 10
-    assert np.abs(misclosures(crowd, models)).max() < CLOSES_MM / 3.0
+    assert np.abs(misclosures(batch, models)).max() < CLOSES_MM / 3.0
 
 
-def test_what_cannot_be_looked_at_again_stays_as_it_was_oriented(monkeypatch):
-    """Where no image can be fused at the last look nothing is corrected and nothing set to zero."""
+def test_an_orientation_that_cannot_be_checked_is_not_corrected(monkeypatch):
+    """If no image can be fused at the last check, no element is corrected or set to zero."""
 
-    def all_apart(bench, active, points):
-        nothing = np.zeros((len(points), bench.operators.size))
-        apart = np.full(bench.operators.size, points[0], dtype=object)
-        return Parallaxes(nothing, np.zeros((3, *nothing.shape)), apart)
+    def no_image_fused(workstation, active, points):
+        zeros = np.zeros((len(points), workstation.operators.size))
+        apart = np.full(workstation.operators.size, points[0], dtype=object)
+        return Parallaxes(zeros, np.zeros((3, *zeros.shape)), apart)
 
-    monkeypatch.setattr(Workstation, "look_at_parallaxes", all_apart)
-    _, models = worked(scenario_of(1))
+    monkeypatch.setattr(Workstation, "look_at_parallaxes", no_image_fused)
+    _, models = bridged_strip(scenario_of(1))
     assert abs(models[0].orientation.elements["omega2"][0] - 100.0) < 5.0
     assert abs(models[0].orientation.elements["phi2"][0] - 100.0) < 5.0
 
 
 def test_a_model_without_a_common_point_on_its_left_is_refused(monkeypatch):
     scenario = scenario_of(2)
-    monkeypatch.setattr(bridging, "model_coordinates", lambda bench, model: {})
-    crowd, models = worked(scenario)
+    monkeypatch.setattr(bridging, "model_coordinates", lambda workstation, model: {})
+    batch, models = bridged_strip(scenario)
     assert len(models) == 1
-    assert "none of its points 1, 3 and 5 was measured before" in crowd.workstation.operators.reasons[0]
+    assert "none of its points 1, 3 and 5 was measured before" in batch.workstation.operators.reasons[0]
 
 
 @pytest.mark.slow
-def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one():
-    """One reading of by' and one of by": a slip in by" is made again too, and nobody gives up for it."""
+def test_two_contradicting_parallax_readings_are_both_repeated():
+    """With one reading of by' and one of by", a slip in by" is repeated too, and no operator gives up because of it."""
     settings = {"plan.parallax_readings": 1, "plan.centre_method": "scales", "observer.blunder_rate": 0.02}
     scenario = load_scenario("akwanga", settings=settings)
     batch = open_batch(msgspec.structs.replace(scenario, models=scenario.models[:1]), range(12))
@@ -193,28 +197,30 @@ def test_of_two_readings_that_contradict_each_other_either_may_be_the_wrong_one(
 
 
 @pytest.mark.parametrize(("photo", "picture", "bridged"), [(1, "202", 0), (2, "203", 1)])
-def test_who_gives_up_a_bridge_says_why_and_leaves_the_models_that_stand(tmp_path, photo, picture, bridged):
-    """Exit code 1, the reason in results, table and complaint; nothing is worked independently."""
-    said = a7sim_in_process(
+def test_an_operator_that_gives_up_a_bridge_reports_why_and_keeps_the_finished_models(
+    tmp_path, photo, picture, bridged
+):
+    """Exit code 1, the reason in results, table and error message; no independent models."""
+    result = a7sim_in_process(
         "bridge", "bridge", "--set", f"photos.{photo}.laid=upside down", "--set", "plan.parallax_readings=1",
         "--out", tmp_path / "out",
     )  # fmt: skip
     document = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
-    assert (said.returncode, document["status"]) == (1, "does not fit")
+    assert (result.returncode, document["status"]) == (1, "does not fit")
     assert document["message"].startswith(f"picture {picture} lies upside down")
-    assert said.stderr == f"a7sim: the operator gave up: {document['message']}\n"
-    assert f"does not fit: {document['message']}" in " ".join(said.stdout.split())
+    assert result.stderr == f"a7sim: the operator gave up: {document['message']}\n"
+    assert f"does not fit: {document['message']}" in " ".join(result.stdout.split())
     models = document["bridged"]["models"]
     assert len(models) == bridged
     for model in models:
         row = [model["model"], model["base"], f"{model['elements']['bx']:.2f}", f"{model['scale']:.5f}"]
-        assert row in [line.split()[:4] for line in said.stdout.splitlines()]
+        assert row in [line.split()[:4] for line in result.stdout.splitlines()]
     assert "independent" not in document and not (tmp_path / "out" / "independent").exists()
 
 
 @pytest.fixture(scope="module")
 def with_control():
-    """Two models whose standard points are control, and the degree of a strip's polynomials."""
+    """Return a scenario of two models with standard points as control and polynomials of degree 2."""
     scenario = scenario_of(2, **{"strip.polynomial": "2"})
     (scene,) = open_batch(scenario, (1,)).scenes
     places = {name: at for name, at in scene.ground_points.items() if name in {f"{i}" for i in range(2000, 2100)}}
@@ -226,18 +232,18 @@ def with_control():
 
 
 @pytest.mark.slow
-def test_the_command_bridges_to_its_end_and_shows_what_polynomials_do_beside_the_similarity(monkeypatch, with_control):
-    """In both ways, and with more unknowns the control never fits worse; where nothing is to be kept, nothing is."""
+def test_the_command_compares_polynomials_with_the_similarity(monkeypatch, with_control):
+    """Bridged and independent: with more unknowns, the control never fits worse. Without --out no file is written."""
     monkeypatch.setattr("a7sim.cli.run_options.resolve_scenario", lambda *_: (with_control, 1))
-    said = a7sim_in_process("bridge", "bridge")
-    assert (said.returncode, said.stderr) == (0, "")
+    result = a7sim_in_process("bridge", "bridge")
+    assert (result.returncode, result.stderr) == (0, "")
     rows = {
         tuple(line.split(" 9 control ")[0].split()): line.split()
-        for line in said.stdout.splitlines()
+        for line in result.stdout.splitlines()
         if " 9 control " in line
     }
-    for way in ("bridged", "independent"):
-        by_similarity, by_polynomials = rows[way,], rows[f"{way},", "polynomial"]
+    for method in ("bridged", "independent"):
+        by_similarity, by_polynomials = rows[method,], rows[f"{method},", "polynomial"]
         for alone, bent in zip(by_similarity[-2:], by_polynomials[-2:], strict=True):
             assert float(bent) <= float(alone) + 0.001
-    assert "hours at the instrument bridging" in said.stdout
+    assert "hours at the instrument bridging" in result.stdout

@@ -1,4 +1,4 @@
-"""Cards of the N.R.C. strip program: what is written is read, and a bad card is named."""
+"""Cards of the N.R.C. strip program: written cards can be read, and error messages name a bad card."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def deck(tmp_path, text=DECK):
     return path
 
 
-def test_a_deck_is_read_as_its_columns_say(tmp_path):
+def test_a_deck_is_read_by_its_columns(tmp_path):
     found = read_cards(deck(tmp_path))
     assert found.ground.points == ("101", "102", "103")
     assert found.ground.roles == ("control",) * 3
@@ -58,11 +58,11 @@ def test_a_deck_is_read_as_its_columns_say(tmp_path):
         ("aba.txt", "", False),
     ],
 )
-def test_cards_are_told_by_their_ending_or_their_look(name, text, expected):
+def test_a_deck_is_recognised_by_its_file_name_or_its_content(name, text, expected):
     assert is_deck(name, text) is expected
 
 
-def test_what_is_written_is_what_was_read(tmp_path):
+def test_written_cards_equal_the_cards_read(tmp_path):
     found = read_cards(deck(tmp_path))
     lines = deck_lines(found.ground, found.models)
     write_cards(tmp_path / "again.txt", lines)
@@ -87,18 +87,18 @@ def strip_of(rng, photographs):
 
 @examples(30)
 @given(st.integers(0, 2**32 - 1))
-def test_strips_of_any_length_go_through_cards_and_their_order_does_not_matter(tmp_path_factory, seed):
+def test_strips_of_any_length_survive_cards_in_any_order(tmp_path_factory, seed):
     rng = np.random.default_rng(seed)
     models, ground = strip_of(rng, int(rng.integers(2, 6)))
     lines = deck_lines(ground, models)
-    sections, here = [], []
+    sections, section = [], []
     for line in lines:
         if line in ("  -1", "  -2"):
-            sections.append(here)
-            here = [line]
+            sections.append(section)
+            section = [line]
         else:
-            here.append(line)
-    sections.append(here)
+            section.append(line)
+    sections.append(section)
     shuffled = []
     for section in sections:
         fixed = 2 if section and section[0] == "  -2" else 1 if section and section[0] == "  -1" else 0
@@ -153,7 +153,7 @@ def test_a_card_one_column_off_is_found(tmp_path, card, off):
 
 
 @pytest.mark.parametrize("off", ["right", "left"])
-def test_a_full_card_one_column_off_is_found_though_every_field_still_reads(tmp_path, off):
+def test_a_full_card_one_column_off_is_found_although_every_field_is_a_number(tmp_path, off):
     full = "   112271" + "12345.678" + "23456.789" + "34567.891"
     lines = DECK.splitlines()
     lines[4] = " " + full if off == "right" else full[1:]
@@ -162,13 +162,13 @@ def test_a_full_card_one_column_off_is_found_though_every_field_still_reads(tmp_
 
 
 @pytest.mark.parametrize("off", [" ", ""])
-def test_a_control_card_off_its_columns_is_found(tmp_path, off):
+def test_a_section_card_off_its_columns_is_found(tmp_path, off):
     text = DECK.replace("  -2\n", f"{off}  -2\n" if off else " -2\n", 1)
     with pytest.raises(A7SimError, match="line 7, column"):
         read_cards(deck(tmp_path, text))
 
 
-def test_blank_cards_mean_nothing(tmp_path):
+def test_blank_cards_are_skipped(tmp_path):
     spaced = deck_lines_of(read_cards(deck(tmp_path, DECK.replace("\n", "\n\n"))))
     assert spaced == deck_lines_of(read_cards(deck(tmp_path)))
 
@@ -207,7 +207,7 @@ def deck_lines_of(read):
         ),
     ],
 )
-def test_a_bad_card_is_named_by_file_line_and_column(tmp_path, old, new, where):
+def test_an_error_message_names_file_line_and_column_of_a_bad_card(tmp_path, old, new, where):
     assert old in DECK
     with pytest.raises(A7SimError) as caught:
         read_cards(deck(tmp_path, DECK.replace(old, new, 1)))
@@ -216,7 +216,7 @@ def test_a_bad_card_is_named_by_file_line_and_column(tmp_path, old, new, where):
     assert "expected" in str(caught.value)
 
 
-def test_files_that_are_no_decks_are_refused(tmp_path):
+def test_a_file_that_is_no_deck_is_refused(tmp_path):
     lines = DECK.splitlines(keepends=True)
     for text in ("", "\n\n", "".join(lines[:3]), "".join(lines[:4]), "".join(lines[:10]), "".join(lines[:11])):
         with pytest.raises(A7SimError, match=r"aba\.txt"):
@@ -239,7 +239,7 @@ def without_centres(model):
     return model
 
 
-def test_what_does_not_fit_a_card_is_refused():
+def test_a_value_that_does_not_fit_a_card_is_refused():
     models, ground = strip_of(np.random.default_rng(1), 2)
     with pytest.raises(A7SimError, match="nine columns"):
         deck_lines(Ground(("1",), np.array([[4505079.577], [0.0], [0.0]]), ("control",)), models)

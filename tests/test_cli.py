@@ -1,4 +1,4 @@
-"""Behaviour at the command line: what a user types, sees and finds in the folder."""
+"""Behaviour of the command line: options, printed text and written files."""
 
 import csv
 import json
@@ -28,12 +28,12 @@ WORK_FILES = {
 STRIP_FILES = {"strip.csv", "strip.crd", "strip-output.crd", "strip-numbers.csv"}
 FILES = WORK_FILES | STRIP_FILES
 
-HEEDING_CTRL_C = """
+PROGRAM_WITH_CTRL_C = """
 import runpy, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 runpy.run_module("a7sim", run_name="__main__")
 """
-"""The command line, which heeds SIGINT also where the test run was started in the background and ignores it."""
+"""The command line with SIGINT enabled, also if the test run was started in the background and ignores it."""
 
 
 def a7sim(*arguments, cwd=ROOT):
@@ -46,7 +46,7 @@ def akwanga_run(finished):
     return done, out
 
 
-def test_importing_and_asking_for_help_load_nothing_heavy():
+def test_import_and_help_load_no_heavy_library():
     for program in ("import a7sim", "import sys; sys.argv = ['a7sim', '--help']; import a7sim.cli; a7sim.cli.main()"):
         seen = subprocess.run(
             [
@@ -80,12 +80,12 @@ def test_a_run_prints_the_tables_of_the_thesis_beside_the_truth(akwanga_run):
     assert done.stderr == ""
 
 
-def test_a_run_leaves_its_files(akwanga_run):
+def test_a_run_writes_its_files(akwanga_run):
     _, out = akwanga_run
     assert {path.name for path in out.iterdir()} == FILES
 
 
-def test_results_hold_what_is_promised(akwanga_run):
+def test_results_contain_the_documented_keys(akwanga_run):
     _, out = akwanga_run
     results = json.loads((out / "results.json").read_text(encoding="utf-8"))
     assert list(results)[:2] == ["schema_version", "command"]
@@ -111,7 +111,7 @@ def test_results_hold_what_is_promised(akwanga_run):
         assert {"relative_rotation", "base_direction", "rotation_difference_gon"} <= set(model["truth"])
 
 
-def test_the_journal_holds_every_line_in_order_with_simulated_time(akwanga_run):
+def test_the_journal_contains_every_line_in_order_with_simulated_time(akwanga_run):
     _, out = akwanga_run
     header, *lines = map(json.loads, (out / "session.jsonl").read_text(encoding="utf-8").splitlines())
     assert header["schema_version"] == 3
@@ -145,7 +145,7 @@ def test_the_book_and_the_models_are_tables(akwanga_run):
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_gives_other_numbers(akwanga_run, tmp_path):
-    """Also in a process of its own, whose hashes are others."""
+    """Also in another process, which has another hash seed."""
     _, out = akwanga_run
     again = in_a_process("run", ROOT / "scenarios/akwanga.toml", "--seed", 7, *READ_ONCE, "--out", tmp_path / "again")
     assert again.returncode == 0
@@ -179,8 +179,8 @@ def test_options_reach_the_session():
 
 
 def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(tmp_path):
-    mine = tmp_path / "thesis.txt"
-    mine.write_text("mine", encoding="utf-8")
+    thesis = tmp_path / "thesis.txt"
+    thesis.write_text("mine", encoding="utf-8")
     refused = a7sim("run", "dewitt-pair", "--out", tmp_path)
     assert refused.returncode == 2
     assert refused.stderr.count("\n") == 1
@@ -188,7 +188,7 @@ def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(t
     assert {path.name for path in tmp_path.iterdir()} == {"thesis.txt"}
     assert a7sim("run", "dewitt-pair", *READ_ONCE, "--out", tmp_path, "--force").returncode == 0
     assert {path.name for path in tmp_path.iterdir()} == WORK_FILES | {"thesis.txt"}
-    assert mine.read_text(encoding="utf-8") == "mine"
+    assert thesis.read_text(encoding="utf-8") == "mine"
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_an_existing_folder_is_refused_unless_forced_and_nothing_in_it_is_lost(t
         (["stereo"], ["stereo"]),
     ],
 )
-def test_bad_input_gets_a_sentence_and_exit_code_2_without_traceback(arguments, words):
+def test_bad_input_ends_with_one_sentence_and_exit_code_2_without_traceback(arguments, words):
     done = a7sim(*arguments)
     assert done.returncode == 2
     assert done.stdout == ""
@@ -218,7 +218,7 @@ def test_bad_input_gets_a_sentence_and_exit_code_2_without_traceback(arguments, 
         assert word in last
 
 
-def test_bad_input_leaves_earlier_results_and_no_new_folder(finished, tmp_path):
+def test_bad_input_keeps_earlier_results_and_makes_no_new_folder(finished, tmp_path):
     out = finished("dewitt-pair", 7).copy_to(tmp_path / "out")
     before = {path.name: path.read_bytes() for path in out.iterdir()}
     (tmp_path / "dewitt-pair.csv").write_bytes("point,xl,yl,xr,yr\nä,1,2,3,4\n".encode("latin-1"))
@@ -229,7 +229,7 @@ def test_bad_input_leaves_earlier_results_and_no_new_folder(finished, tmp_path):
     assert not (tmp_path / "new").exists()
 
 
-def test_names_with_commas_are_names_like_any_other(tmp_path):
+def test_names_may_contain_commas(tmp_path):
     scenario = (ROOT / "scenarios" / "akwanga.toml").read_text(encoding="utf-8")
     scenario = scenario.replace('"C1"', '"C,1"').replace('"101"', '"1,01"')
     (tmp_path / "commas.toml").write_text(scenario, encoding="utf-8")
@@ -239,7 +239,7 @@ def test_names_with_commas_are_names_like_any_other(tmp_path):
 
 
 @pytest.mark.parametrize("environment", [{"PYTHONIOENCODING": "ascii"}, {"COLUMNS": "40"}, {"NO_COLOR": "1"}])
-def test_any_terminal_gets_its_tables(environment, monkeypatch):
+def test_tables_are_printed_on_any_terminal(environment, monkeypatch):
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
     run = in_a_process if "PYTHONIOENCODING" in environment else a7sim
@@ -247,7 +247,7 @@ def test_any_terminal_gets_its_tables(environment, monkeypatch):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_full_disk_is_said_in_a_sentence():
+def test_a_full_disk_is_reported_without_traceback():
     with Path("/dev/full").open("w", encoding="ascii") as full:
         done = subprocess.run(
             [sys.executable, "-m", "a7sim", "scenario", "schema"],
@@ -261,7 +261,7 @@ def test_a_full_disk_is_said_in_a_sentence():
     assert "Traceback" not in done.stderr
 
 
-def test_pages_show_what_a_run_prints():
+def test_pages_quote_the_output_of_a_run():
     printed = " ".join(a7sim("run", "scenarios/akwanga.toml").stdout.split())
     for page, heading in (("README.md", "## What `make run` shows"), ("docs/running.md", "## What it shows")):
         shown = (ROOT / page).read_text(encoding="utf-8").split(heading)[1].split("\n## ")[0]
@@ -271,13 +271,13 @@ def test_pages_show_what_a_run_prints():
 
 
 def test_debug_shows_the_traceback():
-    """In a process, the interpreter prints it; after the command, `--debug` lets the same error through."""
+    """In a process the interpreter prints it; after the command, `--debug` raises the same error."""
     assert "Traceback" in in_a_process("--debug", "run", "nowhere").stderr
     with pytest.raises(A7SimError, match="nowhere"):
         a7sim("run", "nowhere", "--debug")
 
 
-def test_a_session_that_does_not_fit_ends_with_1_and_says_why(tmp_path):
+def test_a_session_that_does_not_fit_ends_with_exit_code_1_and_a_reason(tmp_path):
     done = a7sim("run", "akwanga", "--set", "photos.0.laid=upside down", "--out", tmp_path / "out")
     assert done.returncode == 1
     assert "101 lies upside down in projector 1" in done.stderr
@@ -288,7 +288,7 @@ def test_a_session_that_does_not_fit_ends_with_1_and_says_why(tmp_path):
 def test_ctrl_c_leaves_whole_files_and_exit_code_130(tmp_path):
     out = tmp_path / "out"
     settings = ["--case", "E", "--set", "plan.parallax_readings=20"]
-    command = [sys.executable, "-c", HEEDING_CTRL_C, "run", "akwanga", *settings, "--out", str(out)]
+    command = [sys.executable, "-c", PROGRAM_WITH_CTRL_C, "run", "akwanga", *settings, "--out", str(out)]
     running = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 30.0
     journal = out / "session.jsonl"
@@ -315,7 +315,7 @@ def test_validate_names_every_mistake(tmp_path):
     assert len(document["mistakes"]) == 2
 
 
-def test_validate_is_content_with_what_comes_with_a7sim():
+def test_bundled_scenarios_are_valid():
     for name in ("scenarios/akwanga.toml", "scenarios/dewitt-pair.toml"):
         assert a7sim("scenario", "validate", name).returncode == 0
 

@@ -1,4 +1,4 @@
-"""The client's side of the door: any URL is a pyserial port, a client locks and waits, replies hold any byte."""
+"""The client of the link: any URL opens as a pyserial port, a client locks and waits, replies hold any byte."""
 
 import socket
 import threading
@@ -45,7 +45,7 @@ def test_any_url_opens_as_a_pyserial_port(instrument, kind):
         assert (port.readline(), port.read(1), port.read_until(b"\n")) == (b"1;0\n", b"1", b"\n")
 
 
-def test_an_instrument_of_ones_own_opens_by_its_url():
+def test_an_in_process_instrument_opens_by_its_url():
     with Client.open("a7sim://akwanga?seed=7") as client:
         assert client.identity == Identity("WILD HEERBRUGG", "A7", "3268", a7sim.__version__)
 
@@ -71,7 +71,7 @@ def unused_port():
         ("a7sim://nowhere", "expected a scenario file"),
     ],
 )
-def test_what_cannot_be_opened_is_one_clear_sentence(url, sentence):
+def test_a_url_that_cannot_be_opened_is_reported_in_one_sentence(url, sentence):
     with pytest.raises(A7SimError, match=sentence) as raised:
         open_port(url)
     assert "\n" not in str(raised.value)
@@ -79,14 +79,14 @@ def test_what_cannot_be_opened_is_one_clear_sentence(url, sentence):
 
 
 @pytest.mark.parametrize("scheme", ["tcp", "socket", "rfc2217"])
-def test_where_nobody_listens_it_is_said(scheme):
+def test_a_refused_connection_is_reported(scheme):
     with pytest.raises(
         A7SimError, match=r"127\.0\.0\.1:\d+: expected an instrument to answer there: connection refused"
     ):
         open_port(f"{scheme}://127.0.0.1:{unused_port()}")
 
 
-def test_a_line_that_breaks_is_one_clear_sentence():
+def test_a_broken_connection_is_reported_in_one_sentence():
     with socket.create_server(("127.0.0.1", 0)) as server:
         url = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(A7SimError, match=f"{url}: the line broke: the other end hung up"), port_errors(url):
@@ -100,14 +100,14 @@ def test_a_line_that_breaks_is_one_clear_sentence():
 
 @pytest.fixture
 def pair():
-    """A port and the socket at its other end."""
+    """Yield a port and the socket at its other end."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = open_port(f"tcp://127.0.0.1:{server.getsockname()[1]}", timeout=SHORT)
-        with server.accept()[0] as other, port:
-            yield port, other
+        with server.accept()[0] as far_end, port:
+            yield port, far_end
 
 
-def test_small_lines_go_out_at_once(pair):
+def test_short_lines_are_sent_at_once(pair):
     port, _ = pair
     assert port._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
@@ -123,7 +123,7 @@ def test_a_port_reads_lines_however_they_arrive(pair):
     assert (port.readline(), port.in_waiting) == (b"half", 0)
 
 
-def test_a_port_forgets_what_waits_when_it_is_told_to(pair):
+def test_a_port_drops_waiting_bytes_when_its_input_is_reset(pair):
     port, other = pair
     other.sendall(b"one\ntwo\n")
     assert port.readline() == b"one\n"
@@ -132,7 +132,7 @@ def test_a_port_forgets_what_waits_when_it_is_told_to(pair):
     assert (port.in_waiting, port.readline()) == (0, b"")
 
 
-def test_a_closed_port_hangs_up_and_is_not_open(pair):
+def test_a_closed_port_disconnects_and_raises_when_read(pair):
     port, other = pair
     port.close()
     port.close()
@@ -144,7 +144,7 @@ def test_a_closed_port_hangs_up_and_is_not_open(pair):
 # --- the client ----------------------------------------------------------------------------------------
 
 
-def test_a_client_holds_the_lock_while_it_works_and_gives_it_back(client, instrument):
+def test_a_client_holds_the_lock_within_a_block_and_releases_it(client, instrument):
     with Client.open("a7sim://akwanga") as alone, alone.lock() as same:
         assert same is alone
     with client.lock():
@@ -157,7 +157,7 @@ def test_a_client_holds_the_lock_while_it_works_and_gives_it_back(client, instru
     assert client.ask("BASE:BX?") == "30.00"
 
 
-def test_a_client_is_told_that_another_holds_the_lock(client, instrument):
+def test_a_lock_held_by_another_client_raises_an_error(client, instrument):
     other = instrument.open()
     other.feed(b"SYST:LOCK:REQ?\n", 0.0)
     with pytest.raises(InstrumentError, match="another client holds the lock"), client.lock():
@@ -165,7 +165,7 @@ def test_a_client_is_told_that_another_holds_the_lock(client, instrument):
     instrument.close(other.client)
 
 
-def test_a_lock_is_given_back_when_the_work_under_it_fails(client, instrument):
+def test_a_lock_is_released_when_its_block_fails(client, instrument):
     with pytest.raises(ZeroDivisionError), client.lock():
         raise ZeroDivisionError
     assert client.ask("*OPC?") == "1"
@@ -178,20 +178,20 @@ def test_a_client_waits_for_movement(client):
     assert client.ask("COUN:X?") == "10.00"
 
 
-def test_a_client_that_hangs_up_is_gone(client):
+def test_a_closed_client_cannot_send(client):
     client.close()
     with pytest.raises(serial.PortNotOpenError):
         client.ask("*OPC?")
 
 
-def test_a_token_is_shown_first_and_its_quotes_are_doubled():
+def test_the_quotes_of_a_token_are_doubled_at_the_login():
     sent = []
 
-    class Listening:
+    class WriteOnlyPort:
         def write(self, data):
             sent.append(data)
 
-    Client(Listening()).log_in('a "token"')
+    Client(WriteOnlyPort()).log_in('a "token"')
     assert sent == [b'SYST:LOG "a ""token"""\n']
 
 
@@ -211,7 +211,7 @@ def test_a_token_is_shown_first_and_its_quotes_are_doubled():
         (b"#10\n", (b"",), b""),
     ],
 )
-def test_a_reply_is_taken_apart_when_it_is_whole_and_not_before(received, parts, rest):
+def test_a_reply_is_parsed_only_when_it_is_complete(received, parts, rest):
     taken = parse_reply(received)
     assert taken.parts == parts
     assert received[taken.length :] == rest
@@ -220,12 +220,12 @@ def test_a_reply_is_taken_apart_when_it_is_whole_and_not_before(received, parts,
 
 
 @pytest.mark.parametrize("received", [b"#0abc\n", b"#x\n", b"#2ab1\n", b"#11ab\n"])
-def test_bytes_that_are_no_reply_are_not_taken_for_one(received):
+def test_bytes_that_are_no_reply_raise_an_error(received):
     with pytest.raises(MalformedReplyError):
         parse_reply(received)
 
 
-def test_a_client_reads_a_picture_behind_other_answers(client):
+def test_a_client_reads_a_picture_after_other_replies(client):
     for line in MODEL_1:
         client.send(line)
     client.send("*OPC?;:EYEP1:PICT? 200,100,1;:BASE:BX?")
@@ -238,7 +238,7 @@ def test_a_client_reads_a_picture_behind_other_answers(client):
     assert client.errors() == []
 
 
-# --- what comes of a line ------------------------------------------------------------------------------
+# --- exchanges -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -258,14 +258,14 @@ def test_a_client_reads_a_picture_behind_other_answers(client):
         ("BASE:BX?" + " " * 5000, None, [-363]),
     ],
 )
-def test_an_exchange_is_the_reply_to_a_line_and_the_errors_of_it(client, line, shown, numbers):
+def test_an_exchange_contains_the_reply_and_the_errors_of_a_line(client, line, shown, numbers):
     exchange = send_line(client, line)
     assert exchange.shown == shown
     assert [int(error.split(",")[0]) for error in exchange.errors] == numbers
     assert client.ask("*OPC?") == "1"
 
 
-def test_a_line_that_nobody_answers_is_one_clear_sentence(pair):
+def test_a_line_without_an_answer_is_reported_in_one_sentence(pair):
     port, _ = pair
     with pytest.raises(A7SimError, match=r"\*OPC\?: expected an answer in time, got none"):
         send_line(Client(port), "*OPC?")
@@ -299,27 +299,27 @@ def test_a_line_that_nobody_answers_is_one_clear_sentence(pair):
         ("FOO", []),
     ],
 )
-def test_headers_are_completed_where_a_header_may_stand(typed, found):
+def test_headers_are_completed_only_where_a_header_is_allowed(typed, found):
     assert completions(typed, list(EXAMPLES)) == found
 
 
-def test_the_beginning_of_a_line_can_become_any_header():
+def test_an_empty_line_is_completed_to_every_header():
     found = completions("", list(EXAMPLES))
     assert {"*IDN?", "PROJector1:KAPPa", "PROJector2:KAPPa?", "SYSTem:ERRor?", "SYSTem:ERRor:NEXT?"} <= set(found)
     assert len(found) == len(set(found)) > len(EXAMPLES)
 
 
-def test_whatever_is_completed_is_a_header_of_the_instrument(client):
+def test_the_instrument_knows_every_completed_header(client):
     for header in completions("", list(EXAMPLES)):
         client.send(header)
     assert not [error for error in client.errors() if error.startswith("-113")]
 
 
-def test_who_has_not_logged_in_is_told_of_the_token(instrument):
+def test_without_a_login_the_error_message_asks_for_a_token(instrument):
     guarded = SharedInstrument(instrument.autograph)
     guarded.token = "secret"
     with serve_on("tcp", guarded) as url:
-        with Client.open(url, timeout=SHORT) as stranger, pytest.raises(A7SimError, match="asks for a token"):
-            send_line(stranger, "BASE:BX?")
-        with Client.open(url, timeout=SHORT, token="secret") as friend:
-            assert send_line(friend, "BASE:BX?").shown == "0.00"
+        with Client.open(url, timeout=SHORT) as without_token, pytest.raises(A7SimError, match="asks for a token"):
+            send_line(without_token, "BASE:BX?")
+        with Client.open(url, timeout=SHORT, token="secret") as with_token:
+            assert send_line(with_token, "BASE:BX?").shown == "0.00"

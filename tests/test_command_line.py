@@ -1,4 +1,4 @@
-"""One grammar over all commands, light to start, completed by shells; doctor (issue 10)."""
+"""All commands: one grammar, quick start, completion in shells; doctor (issue 10)."""
 
 import json
 import os
@@ -35,7 +35,7 @@ NO_DOCUMENT = {
     "train reset": "does what it says",
     "train new": "writes a folder",
 }
-"""Commands that print no document, and why."""
+"""Commands that print no document, with the reason."""
 
 LIGHT = ("run", "operate", "compile", "calibrate", "bridge", "report", "compare", "train", "doctor", "completion")
 """Commands whose --help imports neither numpy nor rich."""
@@ -61,7 +61,7 @@ def options_of(command):
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_says_what_it_does_with_an_example_of_its_own(name):
+def test_every_command_has_a_description_and_an_example(name):
     first, *_ = COMMANDS[name].help.split("\n\n")
     assert " ".join(first.split()).endswith(".")
     example = re.search(r"Example: (a7sim .*)", COMMANDS[name].help)
@@ -70,14 +70,14 @@ def test_every_command_says_what_it_does_with_an_example_of_its_own(name):
 
 
 @pytest.mark.parametrize("name", [*VERBS])
-def test_every_example_is_taken_by_the_command(name):
+def test_every_example_is_accepted_by_its_command(name):
     words = re.search(r"Example: a7sim (.*)", COMMANDS[name].help)[1].partition(" > ")[0]
     given = [word.strip("'") for word in re.findall(r"'[^']*'|\S+", words)][len(name.split()) :]
     assert VERBS[name].make_context(name, list(given)).params
 
 
 @pytest.mark.parametrize("name", VERBS)
-def test_options_have_help_and_speak_of_the_same_by_the_same_name(name):
+def test_options_have_help_and_equal_options_have_equal_placeholders(name):
     options = options_of(VERBS[name])
     for option, parameter in options.items():
         assert parameter.help, f"{name} {option} has no help"
@@ -91,7 +91,7 @@ def test_options_have_help_and_speak_of_the_same_by_the_same_name(name):
         assert document not in options or options[document].is_flag
 
 
-OF_ITS_OWN = {
+OPTIONS_WITH_SEVERAL_MEANINGS = {
     "--method": "a procedure, or a way to compute",
     "--flying-height": "above the ground for prepare, above the sea for refraction",
     "--link": "where one is served, or where to serve",
@@ -100,20 +100,20 @@ OF_ITS_OWN = {
     "--resume": "the last session of a console, or the folder of a session",
     "--speed": "a pace, or any number",
 }
-"""Options that two commands have in two senses, and why."""
+"""Options with different meanings in different commands, with the reason."""
 
 
-def test_an_option_reads_the_same_in_every_help():
-    told = {}
+def test_an_option_has_the_same_help_in_every_command():
+    meanings = {}
     for command in VERBS.values():
         for name, option in options_of(command).items():
-            meant = (option.help.partition("  [")[0].rstrip("."), option.make_metavar(click.Context(command)))
-            told.setdefault(name, set()).add(meant)
-    assert {name for name, meant in told.items() if len(meant) > 1} == set(OF_ITS_OWN)
-    assert all(re.match("(Folder|File) for ", about) for about, _ in told["--out"])
+            meaning = (option.help.partition("  [")[0].rstrip("."), option.make_metavar(click.Context(command)))
+            meanings.setdefault(name, set()).add(meaning)
+    assert {name for name, found in meanings.items() if len(found) > 1} == set(OPTIONS_WITH_SEVERAL_MEANINGS)
+    assert all(re.match("(Folder|File) for ", about) for about, _ in meanings["--out"])
 
 
-def test_the_plotters_to_choose_from_are_those_of_the_manual():
+def test_the_choices_of_plotter_are_the_variants():
     assert tuple(VARIANTS) == PLOTTERS
 
 
@@ -189,16 +189,16 @@ FLOWN = ("--c", "152.676", "--photo-scale", "8000", "--photo-base", "91")
         (["completion", "tcsh"], "SHELL: expected one of bash, zsh, fish, got 'tcsh'"),
     ],
 )
-def test_what_cannot_be_read_is_said_in_one_sentence(typed, words, sentence):
+def test_a_wrong_command_line_is_reported_in_one_sentence(typed, words, sentence):
     code, out, err = typed(*words)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith(f"a7sim: {sentence}")
 
 
-def test_without_textual_the_console_says_how_to_get_it(typed, monkeypatch):
+def test_without_textual_the_error_message_names_its_installation(typed, monkeypatch):
     monkeypatch.setitem(sys.modules, "textual", None)
-    said = "a7sim: console: expected textual to be installed: pip install 'a7sim[console]'\n"
-    assert typed("console", "akwanga") == (2, "", said)
+    message = "a7sim: console: expected textual to be installed: pip install 'a7sim[console]'\n"
+    assert typed("console", "akwanga") == (2, "", message)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_without_textual_the_console_says_how_to_get_it(typed, monkeypatch):
     ids=["too deep", "not UTF-8"],
 )
 @pytest.mark.parametrize("words", [["run"], ["study"], ["train", "check-exercise"], ["console", "akwanga", "--keymap"]])
-def test_every_reader_of_toml_refuses_it_in_the_same_words(typed, tmp_path, words, content, sentence):
+def test_every_reader_of_toml_reports_a_bad_file_in_the_same_words(typed, tmp_path, words, content, sentence):
     folder = tmp_path / "20-clouds"
     folder.mkdir()
     path = folder / "exercise.toml"
@@ -221,14 +221,14 @@ def test_every_reader_of_toml_refuses_it_in_the_same_words(typed, tmp_path, word
 
 
 @pytest.mark.parametrize("name", VERBS)
-def test_an_option_that_no_command_has_is_refused_by_all(typed, name):
+def test_every_command_refuses_an_unknown_option(typed, name):
     code, out, err = typed(*name.split(), "--nonsense")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert err.startswith("a7sim: ")
 
 
 @pytest.mark.parametrize("group", [name for name, each in COMMANDS.items() if isinstance(each, LazyGroup)])
-def test_what_a_list_says_of_a_command_fits_a_line(typed, group):
+def test_the_summary_of_a_command_in_a_list_fits_one_line(typed, group):
     _, listed, _ = typed(*group.split(), "--help")
     lines = listed.partition("Commands:\n")[2].splitlines()
     assert len(lines) == len(COMMANDS[group].list_commands(click.Context(COMMANDS[group])))
@@ -257,7 +257,7 @@ def test_listing_the_commands_imports_none_of_them():
 
 
 @pytest.mark.parametrize("verb", LIGHT)
-def test_a_light_command_says_its_options_without_what_works(verb):
+def test_a_light_command_prints_its_help_without_heavy_imports(verb):
     assert not {"numpy", "scipy", "rich", "textual", "matplotlib"} & modules_of(verb, "--help")
 
 
@@ -269,7 +269,7 @@ print(sorted(set(sys.modules) & {"scipy", "textual", "matplotlib"}))
 """
 
 
-def test_no_command_imports_scipy_textual_or_matplotlib_to_say_its_options():
+def test_no_command_imports_scipy_textual_or_matplotlib_for_its_help():
     done = subprocess.run([sys.executable, "-c", HEAVY_HELP], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
 
@@ -325,7 +325,7 @@ done
 
 
 def asked(shell, script):
-    """Return what a shell prints when it completes the lines that go through all that can be completed."""
+    """Return the completions of a shell, one set for each line of `IN_A_SHELL`."""
     lines = [line for line, _ in COMPLETED if line in IN_A_SHELL]
     done = subprocess.run(
         [shell, "-c", script, *([shell] if shell != "fish" else []), *lines],
@@ -349,7 +349,7 @@ def test_verbs_options_choices_and_names_are_completed(line, wanted):
     assert {each.value for each in found} == wanted
 
 
-def test_what_is_no_name_is_completed_as_a_file():
+def test_a_path_is_completed_as_a_file():
     found = BashComplete(cli, {}, "a7sim", "_A7SIM_COMPLETE").get_completions(["run"], "./mine")
     assert [(each.type, each.value) for each in found] == [("file", "./mine")]
 
@@ -370,13 +370,13 @@ def test_zsh_completes():
 
 
 @pytest.mark.parametrize("name", ["bash", "zsh", "fish"])
-def test_each_script_speaks_of_a7sim(typed, name):
+def test_each_completion_script_names_a7sim(typed, name):
     code, script, _ = typed("completion", name)
     assert code == 0
     assert f"_A7SIM_COMPLETE={name}_complete" in script
 
 
-def test_the_shell_that_runs_is_taken_where_none_is_named(typed, monkeypatch):
+def test_the_default_shell_is_the_shell_of_the_user(typed, monkeypatch):
     monkeypatch.setenv("SHELL", "/usr/bin/fish")
     assert "fish_complete" in typed("completion")[1]
     monkeypatch.setenv("SHELL", "/bin/tcsh")
@@ -386,7 +386,7 @@ def test_the_shell_that_runs_is_taken_where_none_is_named(typed, monkeypatch):
 # --- doctor -------------------------------------------------------------------------------------------------
 
 
-def test_doctor_tells_what_is_here(typed):
+def test_doctor_lists_libraries_extras_and_bundled_files(typed):
     code, out, err = typed("doctor", "--json")
     found = json.loads(out)
     assert (code, err, found["healthy"]) == (0, "", True)
@@ -423,7 +423,7 @@ def with_versions(monkeypatch):
     return versions
 
 
-def test_doctor_says_what_is_missing_and_how_to_get_it(typed, with_versions):
+def test_doctor_names_a_missing_extra_and_its_installation(typed, with_versions):
     code, out, _ = typed("doctor")
     assert code == 0
     assert "Extra console: ready" in out
@@ -432,7 +432,7 @@ def test_doctor_says_what_is_missing_and_how_to_get_it(typed, with_versions):
     assert "Extra all" not in out
 
 
-def test_doctor_ends_with_1_where_every_command_lacks_something(typed, with_versions):
+def test_doctor_ends_with_exit_code_1_if_a_required_library_does_not_fit(typed, with_versions):
     with_versions["click"] = "8.0.4"
     code, out, _ = typed("doctor")
     assert code == 1
@@ -456,7 +456,7 @@ def test_versions_are_compared_number_by_number(version, asked_for, fits):
     assert doctor.satisfies(version, asked_for) is fits
 
 
-def test_doctor_needs_nothing_of_what_it_looks_for():
+def test_doctor_imports_none_of_the_libraries_that_it_checks():
     assert not {"numpy", "scipy", "rich", "msgspec", "textual"} & modules_of("doctor")
 
 
@@ -470,7 +470,7 @@ def test_doctor_needs_nothing_of_what_it_looks_for():
         ({"TERM": "xterm-256color", "NO_COLOR": "1"}, 0),
     ],
 )
-def test_doctor_tells_what_the_terminal_can_do(typed, monkeypatch, environment, colours):
+def test_doctor_reports_size_and_colours_of_the_terminal(typed, monkeypatch, environment, colours):
     for name in ("TERM", "COLORTERM", "NO_COLOR"):
         monkeypatch.delenv(name, raising=False)
     for name, value in (environment | {"COLUMNS": "79", "LINES": "24"}).items():
@@ -481,7 +481,7 @@ def test_doctor_tells_what_the_terminal_can_do(typed, monkeypatch, environment, 
 
 
 @pytest.mark.parametrize(
-    ("error", "code", "said"),
+    ("error", "code", "message"),
     [
         (KeyboardInterrupt(), 130, "a7sim: interrupted\n"),
         (click.Abort(), 130, "a7sim: interrupted\n"),
@@ -495,20 +495,20 @@ def test_doctor_tells_what_the_terminal_can_do(typed, monkeypatch, environment, 
     ],
     ids=["Ctrl-C", "a question not answered", "a wrong word", "a full disk", "a reader who went away"],
 )
-def test_whatever_ends_a_command_is_said_in_a_sentence_and_raised_where_it_is_debugged(monkeypatch, error, code, said):
-    def ends(*_, **__):
+def test_an_error_that_ends_a_command_is_one_sentence_and_is_raised_with_debug(monkeypatch, error, code, message):
+    def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr(cli, "main", ends)
+    monkeypatch.setattr(cli, "main", fail)
     ended = a7sim_in_process("doctor")
     assert (ended.returncode, ended.stdout) == (code, "")
-    assert ended.stderr.startswith(said) and ended.stderr.count("\n") == bool(said)
+    assert ended.stderr.startswith(message) and ended.stderr.count("\n") == bool(message)
     monkeypatch.setattr(sys, "argv", ["a7sim", "doctor", "--debug"])
     with pytest.raises(type(error)):
         main()
 
 
-def test_a_preparation_prints_as_a_document_what_it_prints_as_a_sheet(typed):
+def test_the_document_of_a_preparation_agrees_with_its_sheet(typed):
     asked = ["prepare", *FLOWN, "--heights", "430.24", "487.92", "--map-scale", "2500"]
     _, sheet, _ = typed(*asked)
     code, printed, err = typed(*asked, "--json")
@@ -516,12 +516,12 @@ def test_a_preparation_prints_as_a_document_what_it_prints_as_a_sheet(typed):
     assert (code, err, document["command"]) == (0, "", "prepare")
     rows = [line.split()[0] for line in sheet.splitlines() if line.startswith("1:")]
     assert rows == [f"1:{each['number']:.0f}" for each in document["scales"]]
-    for said in (
+    for words in (
         f"Flown {document['flight']['flying_height']} m above",
         f"Optimum model scale 1:{document['optimum']['number']:.1f}",
         *(f"{each['bx']:.2f}" for each in document["scales"]),
     ):
-        assert said in sheet
+        assert words in sheet
 
 
 @pytest.mark.parametrize(
@@ -534,9 +534,7 @@ def test_a_preparation_prints_as_a_document_what_it_prints_as_a_sheet(typed):
         ("win32", {"LOCALAPPDATA": "local"}, "local/a7sim"),
     ],
 )
-def test_what_a7sim_keeps_lies_where_the_platform_keeps_such_things(
-    monkeypatch, tmp_path, platform, environment, folder
-):
+def test_the_data_folder_follows_the_platform(monkeypatch, tmp_path, platform, environment, folder):
     monkeypatch.setattr(sys, "platform", platform)
     monkeypatch.setattr(Path, "home", lambda: tmp_path)
     for name in ("XDG_DATA_HOME", "LOCALAPPDATA"):

@@ -1,4 +1,4 @@
-"""The analytical way and the A8 strip: perfect images return the ground, errors do what their sources say."""
+"""Comparator strip and A8 strip: perfect images return the ground, errors have the size of their sources."""
 
 import dataclasses
 
@@ -23,7 +23,7 @@ MILLIMETRE = 0.001
 
 
 def perfect(name, **overrides):
-    """A scenario whose film, observer, comparator and instrument are without error."""
+    """Return a scenario whose film, observer, comparator and instrument are without error."""
     scenario = load_scenario(name, {"comparator.least_count_um": "0.0", **overrides})
     faultless = GridTest(local_um=0.0, principal_distance_mm=0.0, principal_point_mm=0.0)
     instrument = msgspec.structs.replace(scenario.instrument, grid_test=faultless)
@@ -33,7 +33,7 @@ def perfect(name, **overrides):
 
 
 def errors_on_the_ground(result, scene):
-    """Computed minus true at every point of the strip, as oriented absolutely, m."""
+    """Return computed minus true coordinates ``(3, n)`` of the absolutely oriented strip, m."""
     model = result.strip.oriented.model
     names = [name for name in model.points if not is_centre(name)]
     return model.at(names) - np.array([scene.ground_points[name] for name in names]).T
@@ -82,7 +82,7 @@ def test_photographs_swung_by_half_a_turn_make_the_same_strip(orientation):
     assert np.abs(errors_on_the_ground(strip_on_a8(scenario, scene, 1), scene)).max() < 0.2
 
 
-def test_the_earths_curve_is_taken_off_without_being_told_the_flying_height():
+def test_the_curvature_of_the_earth_is_corrected_without_the_flying_height():
     scenario = perfect("a8-strip", **{"air.earth_curvature": "true"})
     scene = build_scene(scenario, 1)
     by_comparator = np.abs(errors_on_the_ground(strip_by_comparator(scenario, scene, 1), scene)).max()
@@ -91,21 +91,23 @@ def test_the_earths_curve_is_taken_off_without_being_told_the_flying_height():
     assert uncorrected > 1.0
 
 
-@pytest.mark.parametrize("way", [strip_by_comparator, strip_on_a8])
-def test_no_truth_goes_into_a_strip(way):
+@pytest.mark.parametrize("method", [strip_by_comparator, strip_on_a8])
+def test_a_strip_does_not_depend_on_the_truth(method):
     scenario = load_scenario("a8-strip")
     scene = build_scene(scenario, 3)
     listed = {point.point for point in scenario.ground}
-    untold = {name: place + (0.0 if name in listed else 1e4) for name, place in scene.ground_points.items()}
-    blind = dataclasses.replace(scene, stations={}, published={}, ground_points=untold)
-    told, found = way(scenario, scene, 3), way(scenario, blind, 3)
-    assert np.array_equal(told.strip.points.coordinates, found.strip.points.coordinates)
+    falsified = {name: place + (0.0 if name in listed else 1e4) for name, place in scene.ground_points.items()}
+    blind = dataclasses.replace(scene, stations={}, published={}, ground_points=falsified)
+    expected, found = method(scenario, scene, 3), method(scenario, blind, 3)
+    assert np.array_equal(expected.strip.points.coordinates, found.strip.points.coordinates)
 
 
-@pytest.mark.parametrize("way", [strip_by_comparator, strip_on_a8])
-def test_the_same_seed_measures_the_same_strip_and_another_seed_another(way):
+@pytest.mark.parametrize("method", [strip_by_comparator, strip_on_a8])
+def test_the_same_seed_measures_the_same_strip_and_another_seed_another(method):
     scenario = load_scenario("a8-strip")
-    once, again, other = (way(scenario, build_scene(scenario, 1), seed).strip.points.coordinates for seed in (1, 1, 2))
+    once, again, other = (
+        method(scenario, build_scene(scenario, 1), seed).strip.points.coordinates for seed in (1, 1, 2)
+    )
     assert np.array_equal(once, again)
     assert not np.array_equal(once, other)
 
@@ -127,7 +129,7 @@ def test_an_a8_reads_its_scales_to_a_hundredth_and_sets_its_centres_by_the_base_
     assert points[2].mean() == pytest.approx(-scenario.plan.projection_height, rel=0.1)
 
 
-def test_smooth_local_errors_have_the_standard_error_of_the_grid_test_and_nothing_that_it_computes():
+def test_smooth_local_errors_have_the_standard_error_of_the_grid_test_and_no_systematic_part():
     grid = np.array(np.meshgrid(np.linspace(-100, 100, 5), np.linspace(-100, 100, 5))).reshape(2, -1)
     x, y = grid
     for seed in range(5):
@@ -147,24 +149,24 @@ def test_a_comparator_that_counts_coarsely_finds_a_coarser_strip():
     assert rms("1.0") < 0.1 < rms("20.0")
 
 
-def test_a_model_with_too_few_common_points_is_named():
+def test_an_error_message_names_a_model_with_too_few_common_points():
     scenario = load_scenario("a8-strip")
     scene = build_scene(scenario, 1)
     blank = dataclasses.replace(scene.photographs["204"], points=scene.photographs["209"].points)
     emptied = dataclasses.replace(scene, photographs=scene.photographs | {"204": blank})
-    for way in (strip_by_comparator, strip_on_a8):
+    for method in (strip_by_comparator, strip_on_a8):
         with pytest.raises(Undetermined, match="model 3: expected at least 5 points"):
-            way(scenario, emptied, 1)
+            method(scenario, emptied, 1)
 
 
-def test_nobody_works_a_plotter_without_a_plan():
+def test_a_strip_at_the_a8_needs_a_plan():
     scenario = load_scenario("schut-1956")
     with pytest.raises(A7SimError, match="plan: expected the settings of a plotter"):
         strip_on_a8(scenario, build_scene(scenario, 1), 1)
 
 
 @pytest.mark.slow
-def test_the_a8_strip_stays_where_the_documentation_says():
+def test_the_accuracy_of_the_a8_strip_agrees_with_the_documentation():
     comparison = compare_a8_to_comparator(load_scenario("a8-strip"), range(1, 61))
     comparator, a8 = (np.median(100.0 * each.rms, axis=1) for each in (comparison.comparator, comparison.a8))
     assert comparator == pytest.approx(DOCUMENTED_COMPARATOR, rel=0.12)

@@ -1,4 +1,4 @@
-"""Compilation: contours and roads followed with the mark, the sheet they make, and the truth beside them."""
+"""Compilation: contours and roads followed with the mark, the map sheet, and the comparison with the truth."""
 
 import json
 import xml.etree.ElementTree as ET
@@ -31,8 +31,8 @@ UNIT_M = SCALE / 8.0 / 1000.0
 """A unit of the Z counter on the ground."""
 
 
-class Worker:
-    """An operator without error at a level model of Akwanga, and what was said over the line."""
+class PlottingSession:
+    """An operator without error at a level model of Akwanga, with the lines on the link."""
 
     def __init__(self):
         scenario = without_errors(load_scenario("akwanga"))
@@ -47,13 +47,13 @@ class Worker:
         control = ground_control(scenario, self.session.scene)
         self.model = level_model(self.workstation, self.view, self.record.points, control, SCALE)
         self.area = Area(np.array([5030.0, 4990.0]), np.array([5110.0, 5070.0]))
-        self.spots = self.at_work(0.0).spot_heights(20.0)
+        self.spots = self.compilation(0.0).spot_heights(20.0)
 
-    def at_work(self, tremor_um):
+    def compilation(self, tremor_um):
         return Compilation(self.workstation, self.session.person, self.view, self.model, self.area, Tracing(tremor_um))
 
-    def too_high(self, readings, height=None):
-        """Heights as drawn minus the true ground, m."""
+    def height_errors(self, readings, height=None):
+        """Return drawn heights minus the heights of the true ground, m."""
         east, north, up = self.model.on_ground(readings)
         return (up if height is None else height) - self.session.scene.ground.height(east, north)
 
@@ -64,52 +64,54 @@ class Worker:
 
 
 @pytest.fixture(scope="module")
-def worker():
-    return Worker()
+def plotting_session():
+    return PlottingSession()
 
 
 @pytest.fixture(scope="module")
-def contour(worker):
-    height = float(np.round(np.mean(worker.spots.range)))
-    return height, worker.at_work(0.0).contour(height, worker.spots)
+def contour(plotting_session):
+    height = float(np.round(np.mean(plotting_session.spots.range)))
+    return height, plotting_session.compilation(0.0).contour(height, plotting_session.spots)
 
 
-def test_the_model_is_level_and_to_scale(worker):
-    assert worker.model.tilt_gon < 0.02
-    assert 1e3 * worker.model.metres_per_mm == pytest.approx(SCALE, rel=2e-4)
+def test_the_model_is_level_and_to_scale(plotting_session):
+    assert plotting_session.model.tilt_gon < 0.02
+    assert 1e3 * plotting_session.model.metres_per_mm == pytest.approx(SCALE, rel=2e-4)
 
 
-def test_the_eyes_see_height_and_slope_of_the_ground(worker):
-    worker.at_work(0.0)._drive(np.array([5070.0, 5030.0]), float(np.nanmean(worker.spots.readings[2])))
+def test_the_stereo_view_gives_height_and_slope_of_the_ground(plotting_session):
+    plotting_session.compilation(0.0)._drive(
+        np.array([5070.0, 5030.0]), float(np.nanmean(plotting_session.spots.readings[2]))
+    )
     active = np.zeros(1, dtype=int)
 
     def true_height(dx, dy):
-        at = worker.workstation.controls.counters(active)[:, 0] + (dx, dy, 0.0)
-        return -float(worker.too_high(at[:, None])[0]) / worker.model.metres_per_mm
+        at = plotting_session.workstation.controls.counters(active)[:, 0] + (dx, dy, 0.0)
+        return -float(plotting_session.height_errors(at[:, None])[0]) / plotting_session.model.metres_per_mm
 
-    look = worker.view.look(FINE_MM)
-    surface = worker.view.surface(look, reach=8.0)
+    look = plotting_session.view.look(FINE_MM)
+    surface = plotting_session.view.surface(look, reach=8.0)
     slope = [true_height(1, 0) - true_height(-1, 0), true_height(0, 1) - true_height(0, -1)]
     assert surface.fused
     assert surface.height == pytest.approx(true_height(0, 0), abs=0.02)
     assert surface.slope == pytest.approx(np.array(slope) / 2.0, abs=0.01)
 
 
-def test_spot_heights_without_error_stand_on_the_ground(worker):
-    errors = worker.too_high(worker.spots.readings.reshape(3, -1))
+def test_spot_heights_without_error_are_on_the_ground(plotting_session):
+    errors = plotting_session.height_errors(plotting_session.spots.readings.reshape(3, -1))
     assert np.abs(errors).max() < 0.25 * UNIT_M
 
 
-def test_a_contour_without_error_lies_on_the_ground_within_a_quarter_of_a_counter_unit(worker, contour):
+def test_a_contour_without_error_is_on_the_ground_within_a_quarter_of_a_counter_unit(plotting_session, contour):
     height, lines = contour
     assert lines
-    errors = np.concatenate([worker.too_high(line.readings, height) for line in lines])
+    errors = np.concatenate([plotting_session.height_errors(line.readings, height) for line in lines])
     assert errors.size > 20
     assert np.sqrt((errors**2).mean()) < 0.1 * UNIT_M
     assert np.abs(errors).max() < 0.25 * UNIT_M
 
 
-def test_a_contour_keeps_its_z_and_ends_at_the_edge_or_where_it_began(worker, contour):
+def test_a_contour_keeps_its_z_and_ends_at_the_edge_or_at_its_start(plotting_session, contour):
     _, lines = contour
     for line in lines:
         assert np.ptp(line.readings[2]) <= 0.011
@@ -118,47 +120,47 @@ def test_a_contour_keeps_its_z_and_ends_at_the_edge_or_where_it_began(worker, co
             assert (line.readings[:, 0] == line.readings[:, -1]).all()
         else:
             for end in line.readings[:2, [0, -1]].T:
-                assert min(*np.abs(end - worker.area.low), *np.abs(worker.area.high - end)) < 0.05
+                assert min(*np.abs(end - plotting_session.area.low), *np.abs(plotting_session.area.high - end)) < 0.05
 
 
-def test_tremor_grows_the_errors_as_it_is_set(worker, contour):
+def test_the_errors_of_a_contour_follow_the_tremor(plotting_session, contour):
     height, _ = contour
     tremor_um = 60.0
-    shaken = worker.at_work(tremor_um).contour(height, worker.spots)
+    shaken = plotting_session.compilation(tremor_um).contour(height, plotting_session.spots)
     readings = np.concatenate([line.readings for line in shaken], axis=1)
-    errors = worker.too_high(readings, height)
-    east, north, _ = worker.model.on_ground(readings)
-    ground = worker.session.scene.ground
-    here = ground.height(east, north)
-    slope = np.hypot(ground.height(east + 1.0, north) - here, ground.height(east, north + 1.0) - here)
+    errors = plotting_session.height_errors(readings, height)
+    east, north, _ = plotting_session.model.on_ground(readings)
+    ground = plotting_session.session.scene.ground
+    height_here = ground.height(east, north)
+    slope = np.hypot(ground.height(east + 1.0, north) - height_here, ground.height(east, north + 1.0) - height_here)
     plan = 1e-6 * tremor_um * 8000.0
     assert np.sqrt((errors**2).mean()) == pytest.approx(np.sqrt((slope**2).mean()) * plan, rel=0.35)
 
 
-def test_a_road_is_followed_by_its_middle(worker):
-    work = worker.at_work(0.0)
-    east, north = worker.session.scene.lines["road1"].middle
-    readings = worker.model.readings_of(np.array([east, north, np.full(east.size, 455.0)]))
-    within = [i for i in range(east.size) if worker.area.contains(readings[:2, i])]
+def test_a_road_is_followed_along_its_middle(plotting_session):
+    work = plotting_session.compilation(0.0)
+    east, north = plotting_session.session.scene.lines["road1"].middle
+    readings = plotting_session.model.readings_of(np.array([east, north, np.full(east.size, 455.0)]))
+    within = [i for i in range(east.size) if plotting_session.area.contains(readings[:2, i])]
     start, towards, end = ((east[i], north[i]) for i in (within[2], within[4], within[-1]))
-    line = work.line(LineTarget("road1", "road", start, towards, end), worker.spots)
-    at = worker.model.on_ground(line.readings)
-    off = [float(worker.session.scene.lines["road1"].distance(place[:, None])[0]) for place in at[:2].T]
+    line = work.line(LineTarget("road1", "road", start, towards, end), plotting_session.spots)
+    at = plotting_session.model.on_ground(line.readings)
+    off = [float(plotting_session.session.scene.lines["road1"].distance(place[:, None])[0]) for place in at[:2].T]
     assert len(off) > 5
     assert np.sqrt(np.mean(np.square(off))) < 0.4
-    assert np.sqrt((worker.too_high(line.readings) ** 2).mean()) < UNIT_M
+    assert np.sqrt((plotting_session.height_errors(line.readings) ** 2).mean()) < UNIT_M
 
 
-def test_vertices_are_registered_and_the_truth_does_not_cross_the_line(worker, contour):
+def test_vertices_are_registered_and_the_truth_does_not_cross_the_link(plotting_session, contour):
     height, _ = contour
-    before = len(worker.lines)
-    worker.at_work(0.0).contour(height, worker.spots)
-    crossed = worker.lines[before:]
+    before = len(plotting_session.lines)
+    plotting_session.compilation(0.0).contour(height, plotting_session.spots)
+    crossed = plotting_session.lines[before:]
     assert any(f'REC "contour {height:g}"' in event.text for event in crossed)
-    said = {
+    headers = {
         unit.split(" ")[0].lstrip(":") for event in crossed if event.direction == "in" for unit in event.text.split(";")
     }
-    assert said <= {
+    assert headers <= {
         "COUN?",
         "DRIV:X",
         "Y",
@@ -172,9 +174,9 @@ def test_vertices_are_registered_and_the_truth_does_not_cross_the_line(worker, c
     } | {"SYST:ERR:COUN?"}
 
 
-def test_geojson_and_svg_can_be_read_and_close(worker, contour):
+def test_geojson_and_svg_can_be_read_and_closed_contours_are_closed(plotting_session, contour):
     height, lines = contour
-    sheet = worker.sheet(lines, (height,))
+    sheet = plotting_session.sheet(lines, (height,))
     found = json.loads(to_geojson(sheet))
     drawn = [each for each in found["features"] if each["properties"]["kind"] == "contour"]
     assert len(drawn) == len(lines)
@@ -191,9 +193,9 @@ def test_geojson_and_svg_can_be_read_and_close(worker, contour):
     assert root.get("width") == f"{float(root.get('viewBox').split()[2]):.1f}mm"
 
 
-def test_the_table_draws_at_map_scale(worker):
-    places = worker.sheet([], ()).on_table(worker.spots.readings[:, [0, -1], [0, -1]])
-    ground = worker.model.on_ground(worker.spots.readings[:, [0, -1], [0, -1]])
+def test_the_plotting_table_draws_at_map_scale(plotting_session):
+    places = plotting_session.sheet([], ()).on_table(plotting_session.spots.readings[:, [0, -1], [0, -1]])
+    ground = plotting_session.model.on_ground(plotting_session.spots.readings[:, [0, -1], [0, -1]])
     on_table, on_ground = (np.diff(each[:2], axis=1)[:, 0] for each in (places, ground))
     assert on_table == pytest.approx(1e3 * on_ground / 2500.0, abs=0.02)
 
@@ -203,25 +205,25 @@ def test_index_contours_are_every_fifth_of_their_interval():
     assert index_contours((446.0, 460.0, 463.0)) == {446.0, 460.0, 463.0}
 
 
-def test_a_height_outside_the_model_is_a_mistake(worker):
+def test_a_height_outside_the_model_is_a_mistake(plotting_session):
     with pytest.raises(A7SimError, match=r"--contour 900: expected a height within the model"):
-        _heights(MapRequest((900.0,), None, (), Tracing(0.0)), worker.spots)
+        _heights(MapRequest((900.0,), None, (), Tracing(0.0)), plotting_session.spots)
     flat = SpotHeights(np.zeros((3, 1, 2)), np.array([[1.0, 2.0]]))
     with pytest.raises(A7SimError, match="at most 100 contours"):
         _heights(MapRequest((), 0.001, (), Tracing(0.0)), flat)
 
 
 @pytest.mark.parametrize(
-    ("wanted", "said"),
+    ("compilation_request", "message"),
     [
         (CompilationRequest("9", (460.0,)), "--model: expected one of 1, 2"),
         (CompilationRequest("1", lines=("road9",)), "--line: expected one of road1, track1, got road9"),
         (CompilationRequest("1"), "compile: expected a --contour"),
     ],
 )
-def test_what_cannot_be_compiled_is_said_before_any_work(wanted, said):
-    with pytest.raises(A7SimError, match=said):
-        compile_model(load_scenario("akwanga"), 1, wanted)
+def test_a_compilation_requestthat_cannot_be_compiled_is_refused_before_the_session(compilation_request, message):
+    with pytest.raises(A7SimError, match=message):
+        compile_model(load_scenario("akwanga"), 1, compilation_request)
 
 
 def test_an_unknown_line_ends_with_one_sentence_and_exit_code_2():
@@ -230,8 +232,8 @@ def test_an_unknown_line_ends_with_one_sentence_and_exit_code_2():
     assert done.stderr == "a7sim: --line: expected one of road1, track1, got road9\n"
 
 
-def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
-    """Plan control without a height, height control without a plan, no checks: nan, not what the terrain has there."""
+def test_the_operator_gets_only_the_coordinates_of_a_points_role():
+    """Plan control has NaN as height and height control NaN in plan, not the terrain's values; checks are left out."""
     scenario = load_scenario("schut-1956")
     given = given_control(scenario, build_scene(scenario, 1))
     at = dict(zip(given.points, given.coordinates.T, strict=True))
@@ -240,7 +242,7 @@ def test_an_operator_is_given_no_coordinate_that_a_points_role_leaves_out():
     assert np.isnan(at["H1"]).tolist() == [True, True, False]
 
 
-def test_a_contour_that_ends_where_it_begins_is_an_emptychained():
+def test_pieces_of_a_line_become_one_polyline():
     assert as_polyline([]).shape == (3, 0)
     assert as_polyline([np.array([1.0, 2.0, 3.0])]).shape == (3, 1)
 

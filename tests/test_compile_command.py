@@ -1,4 +1,4 @@
-"""`a7sim compile` at its door: the folder it leaves, the map against the true ground, its table, what it refuses."""
+"""The command `a7sim compile`: its folder, the map against the true ground, its table, its error messages."""
 
 import json
 import xml.etree.ElementTree as ET
@@ -18,12 +18,12 @@ CONTROL = {"C1", "C2", "C3", "C4"}
 """Points of control in model 1."""
 
 WORDS = ("--seed", SEED, "--contour", f"{HEIGHT:g}", "--line", "road1", "--line", "track1")
-"""As in the session of the gallery."""
+"""Arguments of the session in the gallery."""
 
 
 @pytest.fixture(scope="module")
 def compiled(finished):
-    """Result and folder of the command."""
+    """Return the result and the folder of the command."""
     out, result = finished("compile", SEED)
     return result, out
 
@@ -44,7 +44,7 @@ def scene():
 
 
 def drawn(features, kind):
-    """The lines of a kind: name and coordinates ``(3, n)``, m."""
+    """Return the lines of a kind: name and coordinates ``(3, n)``, m."""
     return [
         (each["properties"]["name"], np.array(each["geometry"]["coordinates"]).T)
         for each in features
@@ -57,9 +57,9 @@ def rms(values):
 
 
 @pytest.mark.slow
-def test_a_compilation_that_comes_to_its_end_leaves_map_book_journal_and_results(compiled, results):
-    said, out = compiled
-    assert (said.returncode, said.stderr) == (0, "")
+def test_a_complete_compilation_writes_map_book_journal_and_results(compiled, results):
+    result, out = compiled
+    assert (result.returncode, result.stderr) == (0, "")
     promised = {"map.svg", "map.geojson", "book.csv", "session.jsonl", "results.json"}
     assert promised <= {each.name for each in out.iterdir()}
     assert (results["command"], results["status"], results["seed"]) == ("compile", "complete", SEED)
@@ -67,7 +67,7 @@ def test_a_compilation_that_comes_to_its_end_leaves_map_book_journal_and_results
 
 
 @pytest.mark.slow
-def test_the_map_holds_the_lines_spot_heights_and_control_that_the_results_count(features, results):
+def test_the_map_contains_the_lines_spot_heights_and_control_of_the_results(features, results):
     kinds = Counter(each["properties"]["kind"] for each in features)
     assert kinds == {
         **Counter(each["kind"] for each in results["lines"]),
@@ -83,7 +83,7 @@ def test_the_map_holds_the_lines_spot_heights_and_control_that_the_results_count
 
 
 @pytest.mark.slow
-def test_the_errors_in_the_results_are_those_of_the_map_beside_the_true_ground(features, results, scene):
+def test_the_errors_in_the_results_are_the_differences_of_map_and_true_ground(features, results, scene):
     contours = [places for _, places in drawn(features, "contour")]
     errors = np.concatenate([places[2] - scene.ground.height(*places[:2]) for places in contours])
     beside = results["beside_the_truth"]["contours"]
@@ -113,7 +113,7 @@ def test_the_sheet_draws_every_line_of_the_results_once(compiled, results):
 
 
 @pytest.mark.slow
-def test_the_printed_table_says_the_numbers_of_the_results(compiled, results):
+def test_the_printed_table_contains_the_numbers_of_the_results(compiled, results):
     printed = " ".join(compiled[0].stdout.split())
     beside = results["beside_the_truth"]["contours"]
     for each in results["lines"]:
@@ -131,15 +131,15 @@ def test_the_printed_table_says_the_numbers_of_the_results(compiled, results):
 
 
 @pytest.mark.slow
-def test_an_operator_who_gives_up_leaves_results_without_a_map_and_exit_code_1(tmp_path):
-    said = a7sim_in_process(
+def test_an_operator_that_gives_up_leaves_results_without_a_map_and_exit_code_1(tmp_path):
+    result = a7sim_in_process(
         "compile", "akwanga", *WORDS, "--set", "photos.1.laid=upside down", "--out", tmp_path / "out"
     )  # fmt: skip
     document = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
-    assert said.returncode == 1
+    assert result.returncode == 1
     assert document["status"] == "does not fit"
-    assert said.stderr == f"a7sim: the operator gave up: {document['message']}\n"
-    assert " ".join(said.stdout.split()) == f"does not fit: {document['message']}"
+    assert result.stderr == f"a7sim: the operator gave up: {document['message']}\n"
+    assert " ".join(result.stdout.split()) == f"does not fit: {document['message']}"
     assert not (tmp_path / "out" / "map.svg").exists()
 
 
@@ -153,6 +153,6 @@ def test_an_operator_who_gives_up_leaves_results_without_a_map_and_exit_code_1(t
     ],
 )
 def test_a_model_that_cannot_be_drawn_is_refused_in_one_sentence(typed, scenario, words, sentence):
-    code, printed, complained = typed("compile", scenario, *words)
-    assert (code, printed, complained.count("\n")) == (2, "", 1)
-    assert sentence in complained
+    code, printed, error = typed("compile", scenario, *words)
+    assert (code, printed, error.count("\n")) == (2, "", 1)
+    assert sentence in error

@@ -1,4 +1,4 @@
-"""The state of maintenance of an instrument: what each fault does, what a class leaves, and that no query tells it."""
+"""The maintenance of an instrument: effects of faults, faults of a class, replies that do not depend on them."""
 
 import dataclasses
 import tomllib
@@ -45,10 +45,10 @@ def instrument(condition="serviced", variant="A7") -> Instrument:
 
 
 def grid_test(stated: Instrument, seed: int, projector: int) -> float:
-    """Return the standard error in um at photo scale of a grid test by lines at the door, as service people did one.
+    """Return the standard error in um at photo scale of a grid test over the link.
 
-    Every cross is brought under the mark from the lower left, the scales are read, and shift, principal distance, swing
-    and both tilts are taken off.
+    Bring every cross under the mark from the lower left and read the scales. Shift, principal distance, swing and both
+    tilts are removed by adjustment.
     """
     client = EngineClient(SharedInstrument(build_autograph(stated, {"grid": photograph("grid", CROSSES)}, seed)))
     client.query(f'PHOT{projector}:LOAD "grid";:PROJ{projector}:PDIS 150;:DRIV:Z -300')
@@ -77,27 +77,27 @@ def _cross_read(client, projector, name, place, units, origin):
     return np.array(client.numbers("COUN:X?;Y?"))
 
 
-def test_a_serviced_plotters_grid_test_comes_out_at_4_to_7_um():
+def test_the_grid_test_of_a_serviced_plotter_gives_4_to_7_um():
     """A7 and A8: 4 to 7 um (G:1066492077/299, geometry.md)."""
     for seed in range(6):
         for projector in (1, 2):
             assert 4.0 <= grid_test(instrument("serviced"), seed, projector) <= 7.0
 
 
-def test_a_new_one_is_better_and_a_worn_one_needs_adjustment():
+def test_a_new_plotter_is_better_and_a_worn_plotter_needs_adjustment():
     """New: 1.9 to 4.5 um a projector (G:1048624420/701); tolerance 7 um, 7.2 um needs adjustment (same, 702)."""
     for seed in range(4):
         assert 1.5 <= grid_test(instrument("new"), seed, 1) <= 4.5
         assert grid_test(instrument("worn"), seed, 1) > 7.0
 
 
-def test_an_a8_has_local_errors_as_an_a7_has():
-    """X and Y are read to 0.02 mm there, 3 um at photo scale, which comes on top."""
+def test_an_a8_has_local_errors_like_an_a7():
+    """Its X and Y are read to 0.02 mm, which adds 3 um at photo scale."""
     found = grid_test(instrument("serviced", "A8"), 2, 1)
     assert 4.0 <= found <= 8.0
 
 
-def test_local_errors_alone_come_out_of_a_grid_test_as_they_were_put_in():
+def test_a_grid_test_returns_the_local_errors_that_were_set():
     alone = Condition(left=ProjectorCondition(local_um=20.0))
     assert grid_test(instrument(alone), 5, 1) == pytest.approx(20.0, rel=0.15)
     assert grid_test(instrument(alone), 5, 2) < 2.5
@@ -107,7 +107,7 @@ def test_local_errors_alone_come_out_of_a_grid_test_as_they_were_put_in():
 
 
 @pytest.mark.parametrize("stated", [*CLASSES, *(Condition(upkeep=each) for each in CLASSES)])
-def test_every_instrument_of_a_class_is_another_and_the_same_seed_gives_the_same(stated):
+def test_each_seed_gives_another_instrument_of_a_class_and_the_same_seed_the_same(stated):
     first, again, other = (draw_condition(instrument(stated), seed) for seed in (1, 1, 2))
     assert first == again
     for name in ("left", "right", "carriage_scale_ppm", "carriage_periodic_phase_gon", "bx_zero_mm"):
@@ -115,20 +115,20 @@ def test_every_instrument_of_a_class_is_another_and_the_same_seed_gives_the_same
     assert first.left != first.right
 
 
-def test_a_name_is_its_table():
+def test_the_name_of_a_class_equals_a_table_with_that_class():
     assert msgspec.structs.replace(draw_condition(instrument("worn"), 3), upkeep=None) == msgspec.structs.replace(
         draw_condition(instrument(Condition(upkeep="worn")), 3), upkeep=None
     )
 
 
-def test_classes_grow_worse_in_every_fault():
+def test_faults_grow_from_class_to_class():
     new, serviced, worn = (dataclasses.astuple(FAULT_SIGMAS[each]) for each in CLASSES)
     for better, middle, worse in zip(new, serviced, worn, strict=True):
         assert better <= middle <= worse
         assert better < worse
 
 
-def test_faults_are_drawn_with_the_size_of_their_class():
+def test_drawn_faults_have_the_size_of_their_class():
     drawn = [draw_condition(instrument("worn"), seed) for seed in range(400)]
     tilts = np.array([each.left.omega_zero_gon for each in drawn])
     assert tilts.std() == pytest.approx(FAULT_SIGMAS["worn"].tilt_zero_gon, rel=0.12)
@@ -138,7 +138,7 @@ def test_faults_are_drawn_with_the_size_of_their_class():
     assert low <= local.min() < local.max() <= high
 
 
-def test_listed_faults_come_on_top_of_those_of_the_class():
+def test_listed_faults_are_added_to_the_faults_of_the_class():
     alone = draw_condition(instrument("serviced"), 4)
     listed = Condition(upkeep="serviced", left=ProjectorCondition(phi_zero_gon=0.5), carriage_backlash_mm=0.1)
     both = draw_condition(instrument(listed), 4)
@@ -148,7 +148,7 @@ def test_listed_faults_come_on_top_of_those_of_the_class():
     assert both.right == alone.right
 
 
-def test_what_is_only_listed_is_all_there_is():
+def test_without_a_class_only_the_listed_faults_exist():
     listed = Condition(
         left=ProjectorCondition(phi_zero_gon=0.5, local_pattern=3), right=ProjectorCondition(local_pattern=4)
     )
@@ -161,7 +161,7 @@ def test_a_pattern_of_local_errors_can_be_named():
     assert draw_condition(instrument(Condition(left=named)), 9).left == named
 
 
-def test_a_worn_instrument_has_its_pictures_laid_as_a_faultless_one():
+def test_maintenance_does_not_change_the_placement_of_pictures():
     def laid(condition):
         stated = Instrument(condition=condition)
         autograph = build_autograph(stated, {"L": photograph("L", {"P": (1.0, 2.0)})}, 8)
@@ -179,7 +179,7 @@ def test_a_worn_instrument_has_its_pictures_laid_as_a_faultless_one():
         ("{ counter_slip_share = 0.1 }", Condition(counter_slip_share=0.1)),
     ],
 )
-def test_a_scenario_names_a_class_or_lists_faults_or_both(written, understood):
+def test_a_scenario_may_name_a_class_and_list_faults(written, understood):
     assert load_scenario("akwanga", {"instrument.condition": written}).instrument.condition == understood
 
 
@@ -194,7 +194,7 @@ def test_a_scenario_names_a_class_or_lists_faults_or_both(written, understood):
         ({"left": {"rod_um": [1]}}, "instrument.condition.left.rod_um: expected a list of 2 numbers, got 1"),
     ],
 )
-def test_mistakes_in_a_condition_are_named(condition, mistake):
+def test_error_messages_name_the_mistakes_in_a_condition(condition, mistake):
     path = find_scenario("akwanga")
     raw = tomllib.loads(path.read_text("utf-8"))
     raw["instrument"] = {"condition": condition}
@@ -203,15 +203,15 @@ def test_mistakes_in_a_condition_are_named(condition, mistake):
     assert refused.value.mistakes == [mistake]
 
 
-# --- play ----------------------------------------------------------------------------------------------
+# --- backlash ------------------------------------------------------------------------------------------
 
-PLAY = 0.05
+BACKLASH_MM = 0.05
 
 
 def _parallaxes(approach):
-    """Return the y-parallax in um at photo scale each time by' was set to zero after `approach` of its turns."""
+    """Return the y-parallaxes in um at photo scale after by' was set to zero from each value of `approach`."""
     pictures = {"L": photograph("L", {"P": (0.0, 0.0)}), "R": photograph("R", {"P": (-90.0, 0.0)})}
-    client = EngineClient(SharedInstrument(Autograph(A7, Condition(backlash_mm=PLAY), pictures)))
+    client = EngineClient(SharedInstrument(Autograph(A7, Condition(backlash_mm=BACKLASH_MM), pictures)))
     client.query('PHOT1:LOAD "L";:PHOT2:LOAD "R";:BASE:BX 180;:DRIV:Z -300')
     seen = []
     for start in approach:
@@ -220,14 +220,14 @@ def _parallaxes(approach):
     return np.array(seen)
 
 
-def test_approached_from_alternating_sides_a_setting_is_bimodal_by_the_play():
+def test_a_setting_approached_from_alternating_sides_is_bimodal_by_the_backlash():
     seen = _parallaxes([-1.0, 1.0] * 10)
     assert np.unique(np.round(seen, 6)).size == 2
-    assert np.ptp(seen) == pytest.approx(1e3 * PLAY / MAGNIFICATION)
+    assert np.ptp(seen) == pytest.approx(1e3 * BACKLASH_MM / MAGNIFICATION)
 
 
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_approached_from_one_side_it_repeats(side):
+def test_a_setting_approached_from_one_side_repeats(side):
     assert np.ptp(_parallaxes([side, 3.0 * side, 0.2 * side] * 5)) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -250,7 +250,7 @@ def test_the_error_of_a_screw_repeats_with_every_turn():
 
 
 @given(st.floats(-250.0, 250.0), st.floats(0.0, 0.05), st.floats(0.0, 6.3))
-def test_the_truth_about_a_place_undoes_the_screws(place, amplitude, phase):
+def test_the_position_for_a_place_takes_the_screw_error_into_account(place, amplitude, phase):
     spindle = Spindle(-280.0, 280.0, 0.0, periodic_error=PeriodicError(amplitude, 5.0, phase))
     spindle.turn_to(spindle.position_without_periodic_error(place), np.random.default_rng(0))
     assert spindle.position == pytest.approx(place, abs=1e-9)
@@ -269,7 +269,7 @@ def test_a_counter_that_never_carries_loses_every_unit_until_it_is_preset():
 
 
 @given(st.lists(st.floats(-200.0, 200.0), min_size=1, max_size=10), st.floats(0.0, 0.2), st.integers(0, 99))
-def test_a_counter_slips_by_whole_units_and_never_by_more_than_it_passed(turns, share, seed):
+def test_a_counter_slips_by_whole_units_and_never_by_more_than_it_advances(turns, share, seed):
     counter, rng, at = Counter(2.0, slip_share=share), np.random.default_rng(seed), 0.0
     for to in turns:
         before = counter.offset
@@ -280,14 +280,14 @@ def test_a_counter_slips_by_whole_units_and_never_by_more_than_it_passed(turns, 
         at = to
 
 
-def test_counters_slip_at_their_share_of_the_passes():
+def test_counters_slip_at_their_share_of_the_carries():
     counter, rng = Counter(slip_share=0.01), np.random.default_rng(5)
     for _ in range(100):
         counter.advance(0.5, 200.5, rng)
     assert -counter.offset == pytest.approx(200, abs=5 * np.sqrt(200))
 
 
-def test_driven_to_a_reading_a_slipping_counter_shows_it_and_the_mark_is_somewhere_else():
+def test_a_slipping_counter_shows_its_reading_while_the_mark_is_at_another_place():
     autograph = Autograph(A7, Condition(counter_slip_share=0.02), rng=np.random.default_rng(1))
     for reading in (150.0, -20.0, 90.5, 3.25):
         autograph.drive("X", reading)
@@ -304,7 +304,7 @@ def test_driven_to_a_reading_a_slipping_counter_shows_it_and_the_mark_is_somewhe
     st.floats(-150.0, 150.0), st.floats(-150.0, 150.0), st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(0.0, 6.2)
 )  # fmt: skip
 def test_an_eccentric_rod_passes_its_cardan_at_its_eccentricity(x, y, across, along, kappa):
-    """The straight line from the mark to where the rod holds the carrier misses the centre by just so much."""
+    """The straight line from the mark to the point where the rod holds the carrier misses the centre by this length."""
     mark, c, eccentricity = np.array([x, y, -300.0]), 150.0, np.array([along, across])
     centre, turned = pose(attitude_from_angles(0.05, -0.03, kappa, np.zeros(3)), np.array([3.0, -2.0, 1.0]))
     image = place_on_carrier(mark, centre, turned, c, np.zeros(2), rod=eccentricity)
@@ -314,13 +314,13 @@ def test_an_eccentric_rod_passes_its_cardan_at_its_eccentricity(x, y, across, al
     assert length_of(missed) == pytest.approx(np.hypot(along, across), rel=2e-3, abs=1e-6)
 
 
-def test_a_plumb_rod_is_beside_its_centre_along_the_axes_of_the_frame():
+def test_a_vertical_rod_is_off_its_centre_along_the_axes_of_the_frame():
     np.testing.assert_allclose(
         eccentric_offset(np.array([0.0, 0.0, -300.0]), np.array([0.01, 0.02])), [0.01, 0.02, 0.0]
     )
 
 
-def test_one_mark_and_many_are_brought_to_the_same_places():
+def test_a_batch_of_marks_is_projected_like_each_mark_alone():
     rng = np.random.default_rng(2)
     marks, places = rng.uniform(-100.0, 100.0, (3, 7)) - [[0.0], [0.0], [300.0]], rng.uniform(-5.0, 5.0, (3, 7))
     angles, phi, rods = rng.uniform(-0.1, 0.1, (3, 7)), rng.uniform(-0.1, 0.1, 7), rng.uniform(-0.1, 0.1, (2, 7))
@@ -337,13 +337,13 @@ def test_one_mark_and_many_are_brought_to_the_same_places():
     assert camera == pytest.approx(rotation(0.0, phi[6], 0.0) @ rotation(*angles[:, 6]))
 
 
-# --- the truth stays inside ----------------------------------------------------------------------------
+# --- the truth does not cross the link -----------------------------------------------------------------
 
 
 @pytest.mark.parametrize("variant", ["A7", "A8"])
 @pytest.mark.parametrize("upkeep", CLASSES)
-def test_nothing_but_the_view_differs_between_a_faulty_instrument_and_a_faultless_one(variant, upkeep):
-    """Settings, counters, registrations, self-test and errors are word for word the same."""
+def test_only_the_view_differs_between_a_faulty_and_a_faultless_instrument(variant, upkeep):
+    """Settings, counters, registrations, self-test and errors are equal."""
     lines = [
         "*IDN?;*TST?;*STB?;*ESR?",
         "PROJ1:KAPP 1.5;PHI 101;OMEG 99.5;PDIS 152.68;:PROJ1:KAPP?;PHI?;OMEG?;PDIS?",

@@ -1,4 +1,4 @@
-"""The console at its door: keys in, the screen out, and nothing said but the command language."""
+"""The console: keys in, the screen out, and only the command language on the link."""
 
 import asyncio
 import threading
@@ -30,22 +30,22 @@ from tests.support.server_thread import ServerThread
 POINTS = ("1021", "1011", "1023", "1013", "1025", "1015")
 
 
-def played(sitting: Coroutine[Any, Any, None]) -> None:
-    asyncio.run(sitting)
+def run_actions(actions: Coroutine[Any, Any, None]) -> None:
+    asyncio.run(actions)
 
 
 @pytest.mark.slow
-def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_give_over_a_link() -> None:
-    heard: list[LinkEvent] = []
-    door = with_photographs(heard.append)
-    console = at(door)
-    eye = Client(InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=5.0))
+def test_an_orientation_by_eye_is_recorded_as_by_the_same_lines_over_a_link() -> None:
+    events: list[LinkEvent] = []
+    engine = with_photographs(events.append)
+    console = at(engine)
+    eye = Client(InProcessSerial(instrument=engine.instrument, clock=engine.clock, timeout=5.0))
 
     def parallaxes(point: str) -> tuple[float, float]:
         px, py = eye.numbers(f'EYEP:STER? "{point}"')
         return px, py
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -83,21 +83,21 @@ def test_a_person_orients_by_eye_and_what_is_recorded_is_what_the_same_lines_giv
             await pilot.press("q")
         assert console.return_code == 0
 
-    played(sit_down())
-    _same_over_a_link(heard)
+    run_actions(perform())
+    _assert_same_over_a_link(events)
 
 
-def _same_over_a_link(heard: list[LinkEvent]) -> None:
-    """Every line that the console said gets the same reply from another instrument over TCP."""
-    mine = next(event.client for event in heard if event.direction == ">")
-    said = [event for event in heard if event.client == mine and "PICT" not in event.text]
-    pictures = sum(event.direction == ">" and "PICT" in event.text for event in heard)
+def _assert_same_over_a_link(events: list[LinkEvent]) -> None:
+    """Every line that the console sent gets the same reply from another instrument over TCP."""
+    mine = next(event.client for event in events if event.direction == ">")
+    exchanged = [event for event in events if event.client == mine and "PICT" not in event.text]
+    pictures = sum(event.direction == ">" and "PICT" in event.text for event in events)
     assert pictures > 20
     replayed = 0
     with ServerThread(with_photographs().instrument) as served:
         line = served.line()
-        replies = iter([event.text for event in said if event.direction == "<" and not event.text.startswith("#")])
-        for event in said:
+        replies = iter([event.text for event in exchanged if event.direction == "<" and not event.text.startswith("#")])
+        for event in exchanged:
             if event.direction == ">" and "?" in event.text:
                 assert line.ask(event.text) == next(replies)
                 replayed += "REC:LAST?" in event.text
@@ -106,10 +106,10 @@ def _same_over_a_link(heard: list[LinkEvent]) -> None:
     assert replayed == len(POINTS)
 
 
-def test_a_key_is_a_step_and_holding_it_is_many() -> None:
+def test_each_press_of_a_key_is_one_step() -> None:
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -120,26 +120,26 @@ def test_a_key_is_a_step_and_holding_it_is_many() -> None:
             await person.press("[", "+")
             assert console.dials.elements["omega2"] == "100.01", "a drum stands between two counts"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_keys_pressed_before_anything_answers_are_done_when_it_does() -> None:
-    door = with_photographs()
-    answers = threading.Event()
+def test_keys_pressed_before_the_connection_are_executed_after_it() -> None:
+    engine = with_photographs()
+    reachable = threading.Event()
 
-    def connected() -> Client:
-        assert answers.wait(20.0)
-        return Client(InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=5.0))
+    def connect() -> Client:
+        assert reachable.wait(20.0)
+        return Client(InProcessSerial(instrument=engine.instrument, clock=engine.clock, timeout=5.0))
 
-    console = Console(ConsoleConfig(connected, lambda: 0.0, drawing=DrawingMode.HALVES))
+    console = Console(ConsoleConfig(connect, lambda: 0.0, drawing=DrawingMode.HALVES))
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             person.strike("right", "right", "y", "s", *"12.5", "enter", "up", "]", "right")
             await pilot.pause()
             assert console.dials is None
-            answers.set()
+            reachable.set()
             await person.until(lambda: console.dials is not None and console.dials.counters["X"] == "12.00")
             await person.settle()
             assert console.dials.counters == {"X": "12.00", "Y": "1.00", "Z": "-300.00"}
@@ -147,13 +147,13 @@ def test_keys_pressed_before_anything_answers_are_done_when_it_does() -> None:
             await person.press("left")
             assert console.dials.counters["X"] == "2.00"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_free_hand_is_a_state_of_its_own_that_goes_past_the_collars() -> None:
+def test_free_hand_ignores_the_collars() -> None:
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -165,42 +165,42 @@ def test_free_hand_is_a_state_of_its_own_that_goes_past_the_collars() -> None:
             await person.press("h", "right")
             assert console.dials.counters["X"] == "0.00"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_the_drum_under_the_mouse_turns_and_is_taken_up() -> None:
-    """A wheel turns its counter; an element comes into hand, of the projector under the mouse."""
+def test_the_drum_under_the_mouse_turns_and_is_selected() -> None:
+    """Scrolling turns a counter, or turns and selects an element of the projector under the mouse."""
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
 
-            async def rolled(drum: str, way: int) -> None:
-                console.post_message(DrumScrolled(drum, way))
+            async def scroll(drum: str, steps: int) -> None:
+                console.post_message(DrumScrolled(drum, steps))
                 await person.settle()
 
-            for drum, hands, side in (("by2", "by", 2), ("kappa1", "kappa", 1), ("bx", "bx", 1)):
+            for drum, name, side in (("by2", "by", 2), ("kappa1", "kappa", 1), ("bx", "bx", 1)):
                 before = float(console.dials.elements[drum])
-                await rolled(drum, 0)
+                await scroll(drum, 0)
                 assert float(console.dials.elements[drum]) == before
-                await rolled(drum, 1)
+                await scroll(drum, 1)
                 assert float(console.dials.elements[drum]) == pytest.approx(before + console.selection.step)
-                assert (console.selection.name, console.selection.side) == (hands, side)
+                assert (console.selection.name, console.selection.side) == (name, side)
             before = float(console.dials.counters["X"])
-            await rolled("X", -1)
+            await scroll("X", -1)
             assert float(console.dials.counters["X"]) == pytest.approx(before - console.selection.step)
             assert console.selection.name == "bx"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_in_free_hand_a_click_in_the_left_picture_brings_that_place_under_the_mark() -> None:
-    """To the right and up in the picture is to the right and up in the model, and nothing at the wheels."""
+def test_in_free_hand_a_click_in_the_left_picture_moves_the_mark_to_that_place() -> None:
+    """Right and up in the picture is right and up in the model. With handwheels a click moves nothing."""
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.look_on()
@@ -217,38 +217,38 @@ def test_in_free_hand_a_click_in_the_left_picture_brings_that_place_under_the_ma
             assert moved["X"] > 0.0 and moved["Z"] == 0.0
             assert abs(moved["Y"]) == pytest.approx(moved["X"], abs=0.02), "half-blocks are square: 4 across, 2 x 2 up"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_what_the_eyes_see_comes_back_after_every_way_to_see_it() -> None:
-    """Eyes, merging, magnification and drawing go round; at the ends of magnifying nothing changes."""
+def test_each_key_of_the_view_cycles_through_its_settings() -> None:
+    """Eyes, merging and drawing repeat in a cycle; magnification stops at its ends."""
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.look_on()
-            for key, seen in (
+            for key, setting in (
                 ("e", lambda view: view.eyes),
                 ("a", lambda view: view.merged),
                 ("v", lambda view: view.drawing),
             ):
-                first, ways = seen(console.view), []
-                while not ways or ways[-1] != first:
+                first, settings = setting(console.view), []
+                while not settings or settings[-1] != first:
                     await person.press(key)
-                    ways.append(seen(console.view))
-                assert len(set(ways)) == len(ways) > 2
+                    settings.append(setting(console.view))
+                assert len(set(settings)) == len(settings) > 2
             for key, end in (("m", MAGNIFICATIONS[-1]), ("M", MAGNIFICATIONS[0])):
                 await person.press(*[key] * (len(MAGNIFICATIONS) + 1))
                 assert console.view.magnification == end
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_what_the_instrument_refuses_is_one_sentence_and_nothing_moves() -> None:
+def test_a_refused_value_is_one_sentence_and_moves_nothing() -> None:
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -260,15 +260,15 @@ def test_what_the_instrument_refuses_is_one_sentence_and_nothing_moves() -> None
             await person.type_in("sixty")
             assert person.message() == "set by' to: expected a number, got 'sixty'"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_a_question_that_is_refused_does_not_break_the_conversation() -> None:
-    door = with_photographs()
-    port = InProcessSerial(instrument=door.instrument, clock=door.clock, timeout=0.1)
+def test_a_refused_query_does_not_break_the_connection() -> None:
+    engine = with_photographs()
+    port = InProcessSerial(instrument=engine.instrument, clock=engine.clock, timeout=0.1)
     console = Console(ConsoleConfig(lambda: Client(port), lambda: 0.0))
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -279,14 +279,14 @@ def test_a_question_that_is_refused_does_not_break_the_conversation() -> None:
             assert person.message() == "there is no picture in projector 1"
             assert console.dials.counters["X"] == "1.00"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_the_book_strikes_out_and_never_erases() -> None:
-    door = with_model()
-    console = at(door)
+def test_entries_of_the_book_are_struck_out_and_never_deleted() -> None:
+    engine = with_model()
+    console = at(engine)
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -297,16 +297,16 @@ def test_the_book_strikes_out_and_never_erases() -> None:
             assert person.message() == "there is nothing in the book to strike out"
             assert str(console.query_one(BookPanel).render()).startswith("x  1 P1")
 
-    played(sit_down())
-    assert door.query("REC:COUN?;:REC:LAST?").endswith('"struck: struck out at the console"')
+    run_actions(perform())
+    assert engine.query("REC:COUN?;:REC:LAST?").endswith('"struck: struck out at the console"')
 
 
-def test_a8_has_the_same_hands_and_says_what_it_lacks() -> None:
+def test_an_a8_has_the_same_controls_and_the_message_names_a_missing_element() -> None:
     akwanga = load_scenario("akwanga-a8")
     instrument = SharedInstrument(build_autograph(akwanga.instrument, {}, 7))
     console = at(EngineClient(instrument))
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -316,14 +316,14 @@ def test_a8_has_the_same_hands_and_says_what_it_lacks() -> None:
             await person.press("p", "+")
             assert console.dials.elements["common_phi"] == "101.00"
 
-    played(sit_down())
+    run_actions(perform())
 
 
 @pytest.mark.parametrize("size", [(80, 24), (100, 30), (160, 48)])
 def test_eyepieces_and_counters_are_on_every_screen(size: tuple[int, int]) -> None:
     console = at(with_model())
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=size) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -336,13 +336,13 @@ def test_eyepieces_and_counters_are_on_every_screen(size: tuple[int, int]) -> No
             await person.press("tab", "tab")
             assert size[0] >= 100 or "sketch 101" in "\n".join(await person.frame())
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_a_resize_in_mid_turn_only_changes_the_size() -> None:
+def test_a_resize_between_key_presses_only_changes_the_size() -> None:
     console = at(with_model())
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -354,13 +354,13 @@ def test_a_resize_in_mid_turn_only_changes_the_size() -> None:
             assert console.dials.counters["X"] == "3.00"
             assert console.sight.look.columns == console.query(EyepieceWidget).first().cells[0]
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_nothing_is_drawn_when_nothing_changes() -> None:
+def test_without_a_change_no_widget_is_drawn() -> None:
     console = at(with_model())
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -372,13 +372,13 @@ def test_nothing_is_drawn_when_nothing_changes() -> None:
             console.draw()
             assert drawn == []
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_plain_says_in_words_what_the_eyes_see() -> None:
+def test_drawing_in_words_describes_the_view() -> None:
     console = at(with_model(), drawing=DrawingMode.WORDS)
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -389,17 +389,17 @@ def test_plain_says_in_words_what_the_eyes_see() -> None:
             assert "1011: left image is about" in person.message()
             assert "▀" not in frame
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
+def test_a_lost_connection_shows_a_banner_and_a_new_connection_is_used() -> None:
     first = ServerThread(with_photographs().instrument)
     first.__enter__()
     second = ServerThread(with_photographs().instrument, endpoints=Endpoints(tcp=[Address("127.0.0.1", first.port)]))
     url = f"tcp://127.0.0.1:{first.port}"
     console = Console(ConsoleConfig(lambda: Client.open(url, timeout=1.0), lambda: 0.0, alone=False))
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -414,13 +414,13 @@ def test_a_dead_link_is_a_banner_and_a_new_one_is_taken_up() -> None:
             assert "does not answer" not in "\n".join(await person.frame())
         await asyncio.to_thread(second.__exit__, None, None, None)
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_another_theme_repaints_drums_and_mark() -> None:
+def test_a_change_of_theme_repaints_drums_and_mark() -> None:
     console = at(with_model())
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.look_on()
@@ -436,23 +436,23 @@ def test_another_theme_repaints_drums_and_mark() -> None:
             await pilot.pause()
             assert colours() == ("#000000", "#ffff00")
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_a_question_that_is_left_says_nothing_and_changes_nothing() -> None:
-    """Escape at any of them; what is answered afterwards is done as ever."""
-    heard: list[LinkEvent] = []
-    console = at_akwanga(heard.append)
+def test_a_cancelled_question_sends_and_changes_nothing() -> None:
+    """Escape cancels each question; a later answer is executed as usual."""
+    events: list[LinkEvent] = []
+    console = at_akwanga(events.append)
 
-    def said() -> list[str]:
-        asking = [event.text for event in heard if event.direction == ">"]
-        return [line for line in asking if "?" not in line]
+    def commands() -> list[str]:
+        lines = [event.text for event in events if event.direction == ">"]
+        return [line for line in lines if "?" not in line]
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
-            before, lines = console.dials, said()
+            before, earlier = console.dials, commands()
             for key in "lrnd":
                 await person.press(key)
                 assert console.screen is not console.main
@@ -463,22 +463,22 @@ def test_a_question_that_is_left_says_nothing_and_changes_nothing() -> None:
                 await person.choose(choice)
                 await person.press("escape")
                 assert console.screen is console.main
-            assert (console.dials, said()) == (before, lines)
+            assert (console.dials, commands()) == (before, earlier)
             await person.press("l")
             await person.choose("plan gear")
             await person.type_in("1-2-1")
             await person.press("n")
             await person.type_in("all is well")
-            assert said()[len(lines) :] == ['GEAR:PLAN "1-2-1"', 'NOTE "all is well"']
+            assert commands()[len(earlier) :] == ['GEAR:PLAN "1-2-1"', 'NOTE "all is well"']
             assert person.message() == "noted: all is well"
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_every_deed_is_in_the_palette_under_its_group_and_keys() -> None:
+def test_every_action_is_in_the_palette_with_its_group() -> None:
     console = at_akwanga()
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -490,13 +490,13 @@ def test_every_deed_is_in_the_palette_under_its_group_and_keys() -> None:
             listed["a larger step"].callback()
             assert console.selection.step > finer
 
-    played(sit_down())
+    run_actions(perform())
 
 
-def test_a_point_clicked_in_a_sketch_is_driven_to() -> None:
+def test_a_click_on_a_point_of_a_sketch_drives_to_it() -> None:
     console = at(with_model())
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
             await person.look_on()
@@ -506,4 +506,4 @@ def test_a_point_clicked_in_a_sketch_is_driven_to() -> None:
             assert person.message() == "near point 1013"
             assert dict(console.dials.counters) != before
 
-    played(sit_down())
+    run_actions(perform())

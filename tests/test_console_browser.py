@@ -1,4 +1,4 @@
-"""`a7sim console --browser`: the console on a page of this machine, which fetches nothing from anywhere else."""
+"""`a7sim console --browser`: the console on a page of this machine, which fetches nothing from other servers."""
 
 import asyncio
 import contextlib
@@ -22,36 +22,36 @@ from tests.support.processes import COMMAND
 from tests.support.server_thread import TIMEOUT_S
 
 LONG_S = 3.0 * TIMEOUT_S
-"""A console is a process of its own, which begins and ends slowly where others work too."""
+"""A console is a separate process, which starts and ends slowly on a busy machine."""
 
 FETCHED = re.compile(r"""(?:src|href)=["']?([^"'> ]+)|url\(["']?([^"')]+)|@import ["']?([^"';]+)""")
 
 
 @contextlib.contextmanager
 def serving(*words: str) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """Serve Akwanga's console at any port; give the process and the address it says."""
+    """Serve the console of Akwanga at a free port; yield the process and the address that it prints."""
     command = [*COMMAND, "console", "akwanga", "--seed", "7", "--browser", "--port", "0", *words]
     with tempfile.TemporaryDirectory() as data:
         environment = {**os.environ, "XDG_DATA_HOME": data}
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         process = subprocess.Popen(command, **pipes, text=True, env=environment)
         try:
-            yield process, _address_said(process)
+            yield process, _printed_address(process)
         finally:
             process.kill()
             process.communicate()
 
 
-def _address_said(process: subprocess.Popen[str]) -> str:
+def _printed_address(process: subprocess.Popen[str]) -> str:
     assert process.stdout is not None and process.stderr is not None
-    said = process.stdout.readline()
-    assert said.startswith("http://127.0.0.1:"), said + process.stderr.read()
-    return said.split()[0]
+    line = process.stdout.readline()
+    assert line.startswith("http://127.0.0.1:"), line + process.stderr.read()
+    return line.split()[0]
 
 
 @contextlib.asynccontextmanager
 async def page_of(address: str) -> AsyncIterator[aiohttp.ClientWebSocketResponse]:
-    """Open what a page opens to its console."""
+    """Open the web socket that a page opens to its console."""
     async with aiohttp.ClientSession() as browser, browser.ws_connect(f"{address}ws?width=100&height=30") as page:
         yield page
 
@@ -62,20 +62,20 @@ def address() -> Iterator[str]:
         yield url
 
 
-def fetched(url: str, **headers: str) -> tuple[str, str]:
-    """Return what is at an address, and the policy that a browser holds it to."""
+def fetch(url: str, **headers: str) -> tuple[str, str]:
+    """Return the text at an address and its content security policy."""
     with urllib.request.urlopen(urllib.request.Request(url, headers=headers), timeout=TIMEOUT_S) as answer:
         return answer.read().decode("utf-8", "replace"), answer.headers["Content-Security-Policy"]
 
 
-def test_the_page_and_all_it_fetches_are_of_this_server(address: str) -> None:
+def test_the_page_fetches_only_from_its_server(address: str) -> None:
     waiting, seen = [""], set()
     while waiting:
         place = waiting.pop()
         if place in seen or place.startswith("data:"):
             continue
         seen.add(place)
-        text, policy = fetched(address + place)
+        text, policy = fetch(address + place)
         assert "default-src 'none'" in policy and "http" not in policy
         without_comments = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
         if not place.endswith(".ttf"):
@@ -109,19 +109,19 @@ def test_a_page_shows_the_console_and_its_keys_work(address: str) -> None:
 @pytest.mark.parametrize(
     "headers", [{"Origin": "http://elsewhere.example"}, {"Host": "elsewhere.example"}, {"Origin": "null"}]
 )
-def test_pages_of_other_sites_are_refused(address: str, headers: dict[str, str]) -> None:
+def test_a_page_of_another_site_is_refused(address: str, headers: dict[str, str]) -> None:
     with pytest.raises(urllib.error.HTTPError) as refused:
-        fetched(f"{address}ws", **headers)
+        fetch(f"{address}ws", **headers)
     assert refused.value.code == 403
 
 
-def test_it_ends_when_no_browser_has_come_for_so_long() -> None:
+def test_the_server_ends_after_its_idle_time_without_a_browser() -> None:
     with serving("--idle-exit", "0.005") as (process, _):
-        said, errors = process.communicate(timeout=LONG_S)
-        assert (process.returncode, said, errors) == (0, "no browser for 0.005 min: ended\n", "")
+        printed, errors = process.communicate(timeout=LONG_S)
+        assert (process.returncode, printed, errors) == (0, "no browser for 0.005 min: ended\n", "")
 
 
-def test_an_open_page_keeps_it_and_a_signal_ends_both() -> None:
+def test_an_open_page_keeps_the_server_running_and_a_signal_ends_both() -> None:
     with serving("--idle-exit", "0.03") as (process, url):
 
         async def visit() -> None:
@@ -138,15 +138,17 @@ def test_an_open_page_keeps_it_and_a_signal_ends_both() -> None:
         assert (process.returncode, errors) == (0, "")
 
 
-def test_what_cannot_be_served_is_one_sentence(typed: Typed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_console_that_cannot_be_served_is_reported_in_one_sentence(
+    typed: Typed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        code, _, said = typed("console", "--browser", "--port", port)
-        assert code == 2 and said == f"a7sim: --port {port}: expected a port that is free: Address already in use\n"
-    code, _, said = typed("console", "--port", "0")
-    assert (code, said) == (2, "a7sim: --port: expected --browser beside it\n")
+        code, _, message = typed("console", "--browser", "--port", port)
+        assert code == 2 and message == f"a7sim: --port {port}: expected a port that is free: Address already in use\n"
+    code, _, message = typed("console", "--port", "0")
+    assert (code, message) == (2, "a7sim: --port: expected --browser beside it\n")
     assert typed("console", "nowhere", "--browser")[0] == 2, "a mistake is found before anything is served"
     monkeypatch.setitem(sys.modules, "a7sim.console.browser", None)
-    code, _, said = typed("console", "--browser")
-    assert code == 2 and said.endswith("expected textual-serve to be installed: pip install 'a7sim[browser]'\n")
+    code, _, message = typed("console", "--browser")
+    assert code == 2 and message.endswith("expected textual-serve to be installed: pip install 'a7sim[browser]'\n")

@@ -1,4 +1,4 @@
-"""What the console draws, as pure functions: eyepieces, drums, sketches, words and the keymap."""
+"""Drawing functions of the console: eyepieces, drums, sketches, words and the keymap."""
 
 import sys
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_half_blocks_show_two_pixels_a_cell_at_32_greys() -> None:
     ]
 
 
-def test_neighbours_that_look_alike_are_one_run() -> None:
+def test_equal_neighbouring_cells_are_one_run() -> None:
     assert rasterize.half_blocks(np.full((2, 9), 128, dtype=np.uint8)) == [[Run(" " * 9, 16, 16)]]
 
 
@@ -52,7 +52,7 @@ def test_braille_lights_the_dots_of_the_pixels() -> None:
 
 
 @given(st.integers(1, 90), st.integers(1, 50))
-def test_the_mark_has_the_middle_cell(width: int, height: int) -> None:
+def test_the_mark_is_in_the_middle_cell(width: int, height: int) -> None:
     columns, rows = rasterize.window(width, height)
     assert columns % 2 and rows % 2 and width - columns <= 1 and height - rows <= 1
     across, down = rasterize.picture_size(DrawingMode.HALVES, columns, rows)
@@ -61,7 +61,7 @@ def test_the_mark_has_the_middle_cell(width: int, height: int) -> None:
     assert sum(run.ink == rasterize.MARK for row in shown for run in row) == 1
 
 
-def test_an_anaglyph_holds_both_eyes() -> None:
+def test_an_anaglyph_contains_both_eyes() -> None:
     left, right = np.full((2, 1), 255, dtype=np.uint8), np.zeros((2, 1), dtype=np.uint8)
     assert rasterize.anaglyph(left, right) == [[Run(" ", 240, 240)]]
     assert rasterize.anaglyph(right, left) == [[Run(" ", 15, 15)]]
@@ -73,17 +73,17 @@ def test_the_optics_darken_the_corners_alone() -> None:
 
 
 @given(st.integers(0, 99999), st.integers(0, 99999))
-def test_a_drum_passes_its_neighbours_and_then_stands(before: int, after: int) -> None:
+def test_a_rolling_digit_passes_its_neighbours_and_ends_at_its_value(before: int, after: int) -> None:
     old, new = f"{before:08.2f}", f"{after:08.2f}"
     assert rolling_frame(old, new, 0) == old
     assert rolling_frame(old, new, ROLLING_FRAMES) == new
     for a, b, between in zip(old, new, rolling_frame(old, new, 1), strict=True):
         if a.isdigit():
-            ways = {(int(between) - int(a)) % 10, (int(a) - int(between)) % 10}
-            assert min(ways) <= 2, f"{a} to {b} by {between}"
+            distances = {(int(between) - int(a)) % 10, (int(a) - int(between)) % 10}
+            assert min(distances) <= 2, f"{a} to {b} by {between}"
 
 
-def test_a_bar_shows_where_an_element_stands() -> None:
+def test_a_bar_shows_the_position_of_an_element() -> None:
     assert bar(-50.0, -50.0, 50.0, 5) == "┃────"
     assert bar(0.0, -50.0, 50.0, 5) == "──┃──"
     assert bar(70.0, -50.0, 50.0, 5, "-", "|") == "----|"
@@ -113,23 +113,23 @@ def test_a_sketch_shows_points_names_and_the_mark() -> None:
         (None, "image not in the field of view"),
     ],
 )
-def test_an_eye_says_no_more_than_it_can_tell(seen: tuple[float, float] | None, words: str) -> None:
+def test_an_image_is_described_within_the_acuity_of_the_eye(seen: tuple[float, float] | None, words: str) -> None:
     assert describe_image(seen, acuity=10.0) == words
 
 
-def test_two_eyes_say_which_image_is_higher() -> None:
+def test_a_parallax_is_described_by_the_higher_image() -> None:
     assert describe_parallax((0.0, 512.0)) == "left image is about 510 um higher, no x-parallax"
     assert describe_parallax((95.0, -61.0)) == "left image is about 60 um lower, x-parallax about 100 um"
 
 
-def test_the_ladder_has_ends() -> None:
+def test_step_sizes_have_a_smallest_and_a_largest() -> None:
     assert (
         ControlSelection().stepping(-99).step == STEP_SIZES[0]
         and ControlSelection().stepping(99).step == STEP_SIZES[-1]
     )
 
 
-def test_hands_say_lines_of_the_language() -> None:
+def test_a_selection_makes_lines_of_the_command_language() -> None:
     selection = ControlSelection("omega", 2).stepping(-1)
     assert selection.turned(-1) == "PROJ2:OMEG:TURN -0.1"
     assert selection.moved("X", 1, 12.0) == "WHE:X 0.1"
@@ -147,16 +147,16 @@ def test_hands_say_lines_of_the_language() -> None:
         (False, False, "truecolor", DrawingMode.ASCII),
     ],
 )
-def test_every_terminal_has_a_drawing(utf8: bool, no_color: bool, colours: str, best: DrawingMode) -> None:
+def test_the_drawing_follows_the_terminal(utf8: bool, no_color: bool, colours: str, best: DrawingMode) -> None:
     assert best_drawing(utf8, no_color, colours) is best
 
 
-def test_the_locale_tells_whether_there_is_utf8() -> None:
+def test_utf8_follows_the_locale() -> None:
     assert speaks_utf8({"LANG": "C.UTF-8"}) and speaks_utf8({})
     assert not speaks_utf8({"LC_ALL": "C", "LANG": "en_US.UTF-8"})
 
 
-def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
+def test_the_sample_keymap_equals_the_default_keymap(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text(sample(), encoding="utf-8")
     assert load_keymap(file) == default_keymap()
@@ -165,7 +165,7 @@ def test_the_sample_keymap_is_the_default_one(tmp_path: Path) -> None:
         assert len(keys) == len(set(keys))
 
 
-def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
+def test_an_action_that_a_keymap_omits_keeps_its_keys(tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text('[keys]\nrecord = ["space", "f5"]\n', encoding="utf-8")
     assert load_keymap(file) == {**default_keymap(), "record": ("space", "f5")}
@@ -184,7 +184,7 @@ def test_a_deed_that_a_keymap_leaves_out_keeps_its_keys(tmp_path: Path) -> None:
         ('[keys]\nrecord = "k"\n', "expected every key once, got 'k' for both kappa and record"),
     ],
 )
-def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) -> None:
+def test_a_bad_keymap_is_reported_in_one_sentence(content: str, words: str, tmp_path: Path) -> None:
     file = tmp_path / "keys.toml"
     file.write_text(content, encoding="utf-8")
     with pytest.raises(A7SimError) as mistake:
@@ -203,7 +203,7 @@ def test_a_bad_keymap_is_one_sentence(content: str, words: str, tmp_path: Path) 
         (["--connect", "tcp://127.0.0.1:1", "--seed", "7"], "expected no --seed beside it"),
     ],
 )
-def test_what_cannot_be_sat_down_at_is_one_sentence_and_exit_2(
+def test_a_console_that_cannot_start_is_one_sentence_and_exit_code_2(
     arguments: list[str],
     words: str,
     tmp_path: Path,
@@ -212,21 +212,21 @@ def test_what_cannot_be_sat_down_at_is_one_sentence_and_exit_2(
 ) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     monkeypatch.setattr(sys, "argv", ["a7sim", "console", *(each.format(folder=tmp_path) for each in arguments)])
-    with pytest.raises(SystemExit) as left:
+    with pytest.raises(SystemExit) as ended:
         main()
-    said = capsys.readouterr().err
-    assert left.value.code == 2 and words in said and said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert ended.value.code == 2 and words in message and message.count("\n") == 1
 
 
-def test_the_keymap_is_written_once(
+def test_a_keymap_is_written_only_to_a_new_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "deep" / "keys.toml"
     monkeypatch.setattr(sys, "argv", ["a7sim", "console", "--write-keymap", "--keymap", str(file)])
     for code in (0, 2):
-        with pytest.raises(SystemExit) as left:
+        with pytest.raises(SystemExit) as ended:
             main()
-        assert left.value.code == code
+        assert ended.value.code == code
     assert load_keymap(file) == default_keymap()
     assert "expected to write a new file" in capsys.readouterr().err
 
@@ -248,7 +248,7 @@ def test_a_slope_in_every_drawing_without_colours(drawing: DrawingMode, golden: 
 
 
 def test_a_slope_in_an_eyepiece_at_32_greys() -> None:
-    """Levels of ink and paper by cell; the corners are darkened."""
+    """Grey levels of foreground and background by cell; the corners are darkened."""
     shown = rasterize.half_blocks(rasterize.apply_vignette(SLOPE))
     cells = [[(run.ink, run.paper) for run in row for _ in run.text] for row in shown]
     assert cells == [

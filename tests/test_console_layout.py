@@ -1,6 +1,6 @@
-"""The console's layout, held against pictures that somebody has looked at (`pytest --snapshot-update` draws them anew).
+"""The layout of the console, compared with checked snapshots (`pytest --snapshot-update` draws them again).
 
-The eyepieces show a test card; what they make of photographs is held by arrays in test_console_drawings.py.
+The eyepieces show a test card; test_console_drawings.py compares the drawing of photographs with arrays.
 """
 
 from collections.abc import Awaitable, Callable
@@ -22,8 +22,8 @@ from a7sim.scenario import load_scenario
 from tests.support.engine_client import EngineClient, with_model
 from tests.support.interactive import Person, at
 
-Compared = Callable[..., bool]
-Played = Callable[[Person], Awaitable[None]]
+Comparison = Callable[..., bool]
+Actions = Callable[[Person], Awaitable[None]]
 
 USUAL = (100, 30)
 
@@ -40,25 +40,25 @@ def _a_test_card_in_the_eyepieces(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def card(rows: int, columns: int) -> Greys:
-    """Return a test card: a light upright in the dark."""
+    """Return a test card: a light vertical line on a dark ground."""
     greys = np.zeros((rows, columns), dtype=np.uint8)
     greys[:, columns // 4] = 240
     return greys
 
 
-def shown_as_before(compare: Compared, console: Console, size: tuple[int, int], play: Played | None = None) -> bool:
-    """Whether a console looks as it did, once somebody has done something at it and all drums stand."""
+def equals_snapshot(compare: Comparison, console: Console, size: tuple[int, int], play: Actions | None = None) -> bool:
+    """Return whether a console equals its snapshot after `play` and after all drums have stopped."""
 
-    async def before(pilot: Pilot[None]) -> None:
+    async def prepare(pilot: Pilot[None]) -> None:
         person = Person(pilot)
         await person.look_on()
         if play is not None:
             await play(person)
         await person.until(lambda: all(counter._frame >= 3 for counter in console.main.query(CounterPanel)))
-        for asked in console.screen.query(Input):
-            asked.cursor_blink = False
+        for field in console.screen.query(Input):
+            field.cursor_blink = False
 
-    return compare(console, terminal_size=size, run_before=before)
+    return compare(console, terminal_size=size, run_before=prepare)
 
 
 async def two_readings(person: Person) -> None:
@@ -68,69 +68,69 @@ async def two_readings(person: Person) -> None:
 
 
 @pytest.mark.parametrize("size", [(80, 24), USUAL, (160, 48)], ids=lambda size: f"{size[0]}x{size[1]}")
-def test_at_every_size(snap_compare: Compared, size: tuple[int, int]) -> None:
-    assert shown_as_before(snap_compare, at(with_model()), size, two_readings)
+def test_at_every_size(snap_compare: Comparison, size: tuple[int, int]) -> None:
+    assert equals_snapshot(snap_compare, at(with_model()), size, two_readings)
 
 
 @pytest.mark.parametrize("theme", ["dark", "light", "contrast"])
-def test_in_every_theme(snap_compare: Compared, theme: str) -> None:
-    assert shown_as_before(snap_compare, at(with_model(), theme=theme), USUAL)
+def test_in_every_theme(snap_compare: Comparison, theme: str) -> None:
+    assert equals_snapshot(snap_compare, at(with_model(), theme=theme), USUAL)
 
 
-def test_an_a8(snap_compare: Compared) -> None:
+def test_an_a8(snap_compare: Comparison) -> None:
     console = at(EngineClient(SharedInstrument(build_autograph(load_scenario("akwanga-a8").instrument, {}, 7))))
-    assert shown_as_before(snap_compare, console, USUAL)
+    assert equals_snapshot(snap_compare, console, USUAL)
 
 
-def test_the_next_panel_on_a_narrow_screen(snap_compare: Compared) -> None:
+def test_the_next_panel_on_a_narrow_screen(snap_compare: Comparison) -> None:
     async def next_panel(person: Person) -> None:
         await person.press("tab")
 
-    assert shown_as_before(snap_compare, at(with_model()), (80, 24), next_panel)
+    assert equals_snapshot(snap_compare, at(with_model()), (80, 24), next_panel)
 
 
-def test_help_with_keys_of_ones_own(snap_compare: Compared) -> None:
+def test_help_with_custom_keys(snap_compare: Comparison) -> None:
     keymap = {**default_keymap(), "record": ("space", "f5"), "help": ("?", "f1")}
 
     async def ask(person: Person) -> None:
         await person.press("f1", "end")
 
-    assert shown_as_before(snap_compare, at(with_model(), keymap=keymap), USUAL, ask)
+    assert equals_snapshot(snap_compare, at(with_model(), keymap=keymap), USUAL, ask)
 
 
-def test_the_bench(snap_compare: Compared) -> None:
+def test_the_bench(snap_compare: Comparison) -> None:
     async def ask(person: Person) -> None:
         await person.press("l")
 
-    assert shown_as_before(snap_compare, at(with_model()), USUAL, ask)
+    assert equals_snapshot(snap_compare, at(with_model()), USUAL, ask)
 
 
-def test_a_reading_to_be_typed_in(snap_compare: Compared) -> None:
+def test_a_reading_to_be_typed_in(snap_compare: Comparison) -> None:
     async def ask(person: Person) -> None:
         await person.press("w", '"', "s")
         await person.press("9", "9")
 
-    assert shown_as_before(snap_compare, at(with_model()), (80, 24), ask)
+    assert equals_snapshot(snap_compare, at(with_model()), (80, 24), ask)
 
 
-def test_a_first_visit_and_a_dead_link(snap_compare: Compared) -> None:
-    async def fall_silent(person: Person) -> None:
+def test_a_first_visit_and_a_dead_link(snap_compare: Comparison) -> None:
+    async def lose_connection(person: Person) -> None:
         person.console._lose(ConnectionLost("the line is broken"))
 
-    assert shown_as_before(snap_compare, at(with_model(), welcome=True), USUAL, fall_silent)
+    assert equals_snapshot(snap_compare, at(with_model(), welcome=True), USUAL, lose_connection)
 
 
-def test_in_words(snap_compare: Compared) -> None:
+def test_in_words(snap_compare: Comparison) -> None:
     console = at(with_model(), drawing=DrawingMode.WORDS, theme="contrast")
 
     async def go(person: Person) -> None:
         await person.press("g")
         await person.choose("1011  ")
 
-    assert shown_as_before(snap_compare, console, USUAL, go)
+    assert equals_snapshot(snap_compare, console, USUAL, go)
 
 
-def test_without_utf8(snap_compare: Compared, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_utf8(snap_compare: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LC_ALL", "C")
     ascii_only: dict[str, Any] = {"drawing": DrawingMode.ASCII}
-    assert shown_as_before(snap_compare, at(with_model(), **ascii_only), (80, 24))
+    assert equals_snapshot(snap_compare, at(with_model(), **ascii_only), (80, 24))

@@ -1,4 +1,4 @@
-"""The console on a real terminal: a person's path, who knows nothing but what stands on the screen."""
+"""The console on a real terminal: the work of a person from the text on the screen alone."""
 
 import re
 from dataclasses import dataclass
@@ -16,11 +16,11 @@ from tests.support.tmux import Terminal, needs_tmux
 POINTS = ("1021", "1011", "1023", "1013", "1025", "1015")
 
 Z_PER_PARALLAX, BY_PER_PARALLAX = Decimal("3.55"), Decimal("2.08")
-"""What clears a mm of x-parallax by Z and a mm of y-parallax by by', from the projection height and c."""
+"""The Z that clears 1 mm of x-parallax and the by' that clears 1 mm of y-parallax, from projection height and c."""
 
 
 @needs_tmux
-def test_real_keys_in_a_real_terminal(tmp_path: Path) -> None:
+def test_the_console_reacts_to_real_keys_in_a_real_terminal(tmp_path: Path) -> None:
     with Terminal(tmp_path, "console", "akwanga", "--seed", "7") as terminal:
         assert "Two eyes, one ground" in terminal.shows("l lays pictures; ? is help")
         terminal.press("l")
@@ -38,8 +38,8 @@ def test_real_keys_in_a_real_terminal(tmp_path: Path) -> None:
 
 
 @dataclass
-class Seen:
-    """What a person reads from the screen in words, by the drums and the message."""
+class Readout:
+    """Values that a person reads from the drums and the message on the screen."""
 
     by: Decimal
     z: Decimal
@@ -49,23 +49,23 @@ class Seen:
     """mm at photo scale, the left image higher."""
 
     @classmethod
-    def read(cls, screen: str) -> "Seen | None":
-        said = re.search(
+    def read(cls, screen: str) -> "Readout | None":
+        words = re.search(
             r"^ \w+: (?:no y-parallax|left image is about ([\d.]+) (um|mm) (higher|lower)), "
             r"(?:no x-parallax|x-parallax about (-?[\d.]+) (um|mm))$",
             "\n".join(line.rstrip() for line in screen.splitlines()),
             re.MULTILINE,
         )
         by, drums = re.search(r"│by +>? *(-?[\d.]+)", screen), re.search(r"─ Z ─.*\n(.*)", screen)
-        if said is None or by is None or drums is None:
+        if words is None or by is None or drums is None:
             return None
-        up, up_unit, way, across, across_unit = said.groups()
+        up, up_unit, direction, across, across_unit = words.groups()
         z = drums[1].split("│")[5].replace(" ", "")
         return cls(
             Decimal(by[1]),
             Decimal(z),
             _mm(across, across_unit),
-            _mm(up, up_unit) * (-1 if way == "lower" else 1),
+            _mm(up, up_unit) * (-1 if direction == "lower" else 1),
         )
 
 
@@ -74,14 +74,14 @@ def _mm(number: str | None, unit: str) -> Decimal:
 
 
 class Observer:
-    """A person who clears parallaxes: keys in, words read."""
+    """A person that clears parallaxes with keys by the words on the screen."""
 
     def __init__(self, terminal: Terminal) -> None:
         self.terminal = terminal
         self.rung = STEP_SIZES.index(1.0)
 
     def turn(self, amount: Decimal, finest: float, forward: str, back: str) -> Decimal:
-        """Turn by the rungs of the ladder as many steps as come nearest to an amount; return how much was turned."""
+        """Turn by whole steps of each size to the value nearest to `amount`; return the turned amount."""
         left, keys = abs(amount), list[str]()
         for rung in reversed(range(STEP_SIZES.index(finest), len(STEP_SIZES))):
             step = Decimal(str(STEP_SIZES[rung]))
@@ -94,47 +94,47 @@ class Observer:
             self.terminal.press(*keys)
         return (abs(amount) - left) * (1 if amount > 0 else -1)
 
-    def looked(self, by: Decimal, z: Decimal) -> Seen:
-        """Look until the drums stand where they were turned to and the words are there; twice the same is seen."""
-        last: list[Seen] = []
+    def look(self, by: Decimal, z: Decimal) -> Readout:
+        """Wait until the drums show `by` and `z` and the readout no longer changes; return the readout."""
+        last: list[Readout] = []
 
-        def standing(screen: str) -> Seen | None:
-            seen = Seen.read(screen)
+        def steady(screen: str) -> Readout | None:
+            seen = Readout.read(screen)
             if seen is None or (seen.by, seen.z) != (by, z):
                 return None
             last.append(seen)
             return seen if last[-8:] == [seen] * 8 else None
 
-        return self.terminal.sees(standing, f"by' at {by} and Z at {z}")
+        return self.terminal.sees(steady, f"by' at {by} and Z at {z}")
 
-    def clear(self, by: Decimal, z: Decimal) -> Seen:
-        """Turn Z and by' until there is no parallax to be seen."""
-        seen = self.looked(by, z)
+    def clear(self, by: Decimal, z: Decimal) -> Readout:
+        """Turn Z and by' until no parallax is visible."""
+        seen = self.look(by, z)
         for _ in range(12):
             if not seen.x_parallax and not seen.y_parallax:
                 return seen
             z += self.turn(seen.x_parallax * Z_PER_PARALLAX, 0.01, "PPage", "NPage")
             by += self.turn(seen.y_parallax * BY_PER_PARALLAX, 0.01, "+", "-")
-            seen = self.looked(by, z)
+            seen = self.look(by, z)
         raise AssertionError(f"parallaxes do not vanish: {seen}")
 
 
 @needs_tmux
 @pytest.mark.slow
-def test_a_person_clears_six_points_with_real_keys_and_the_book_is_what_the_same_lines_give(tmp_path: Path) -> None:
-    heard: list[LinkEvent] = []
-    with ServerThread(with_photographs(heard.append).instrument) as served:
+def test_points_cleared_with_real_keys_are_recorded_as_by_the_same_lines_over_a_link(tmp_path: Path) -> None:
+    events: list[LinkEvent] = []
+    with ServerThread(with_photographs(events.append).instrument) as served:
         url = f"tcp://127.0.0.1:{served.port}"
         with Terminal(tmp_path, "console", "akwanga", "--connect", url, "--plain") as terminal:
-            book = oriented_by_eye(terminal)
+            book = orient_by_eye(terminal)
             terminal.press("q")
             assert "Traceback" not in terminal.shows("left 0")
     assert [line[0] for line in book] == list(POINTS)
     assert len({by for *_, by in book}) == len(POINTS)
-    assert book == recorded_by_the_same_lines(heard)
+    assert book == registrations_of_replay(events)
 
 
-def oriented_by_eye(terminal: Terminal) -> list[tuple[str, ...]]:
+def orient_by_eye(terminal: Terminal) -> list[tuple[str, ...]]:
     """Lay, centre, set c, clear and record six points; return the book as the screen shows it."""
     terminal.shows("l lays pictures; ? is help")
     for side, picture in (("left", "101"), ("right", "102")):
@@ -170,14 +170,14 @@ def oriented_by_eye(terminal: Terminal) -> list[tuple[str, ...]]:
     return re.findall(line, terminal.screen(), re.MULTILINE)
 
 
-def recorded_by_the_same_lines(heard: list[LinkEvent]) -> list[tuple[str, ...]]:
-    """Say what a console said to another instrument over TCP; every reply is the same. Return its registrations."""
-    said = [event for event in heard if event.direction in "<>" and "PICT" not in event.text]
+def registrations_of_replay(events: list[LinkEvent]) -> list[tuple[str, ...]]:
+    """Replay the lines of a console on another instrument over TCP, require equal replies, return the registrations."""
+    exchanged = [event for event in events if event.direction in "<>" and "PICT" not in event.text]
     recorded = []
     with ServerThread(with_photographs().instrument) as served:
         line = served.line()
-        replies = iter([event.text for event in said if event.direction == "<"])
-        for event in said:
+        replies = iter([event.text for event in exchanged if event.direction == "<"])
+        for event in exchanged:
             if event.direction == ">" and "?" in event.text:
                 reply = line.ask(event.text)
                 assert reply == next(replies)

@@ -1,4 +1,4 @@
-"""All that is done at the console is journalled, whatever ends it; the next one offers to go on."""
+"""Each action at the console is recorded in the journal at once; the next console offers to resume the session."""
 
 import asyncio
 import fcntl
@@ -39,28 +39,28 @@ def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "data" / "a7sim"
 
 
-def place(out: Path | None = None, go_on: bool | None = None, seed: int = SEED) -> LocalConsole:
-    return LocalConsole("akwanga", load_scenario("akwanga"), seed, out, go_on)
+def local_console(out: Path | None = None, resume: bool | None = None, seed: int = SEED) -> LocalConsole:
+    return LocalConsole("akwanga", load_scenario("akwanga"), seed, out, resume)
 
 
-def sat_at(here: LocalConsole, sitting: Callable[[Person], Coroutine[Any, Any, None]]) -> Path:
-    """Let a person sit at a place, and leave by the key; return the folder of the session."""
-    console = Console(replace(here.config, drawing=DrawingMode.HALVES))
+def folder_after(local: LocalConsole, actions: Callable[[Person], Coroutine[Any, Any, None]]) -> Path:
+    """Run actions at a console and end it by its key; return the folder of the session."""
+    console = Console(replace(local.config, drawing=DrawingMode.HALVES))
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(100, 30)) as pilot:
             person = Person(pilot)
-            await sitting(person)
+            await actions(person)
             await pilot.press("q")
 
-    asyncio.run(sit_down())
-    kept = here.close()
-    assert kept is not None
-    return kept
+    asyncio.run(perform())
+    folder = local.close()
+    assert folder is not None
+    return folder
 
 
-async def a_beginning(person: Person) -> None:
-    """Lay a picture, make counters show what the job has, change the height gear, turn, record, strike out."""
+async def first_actions(person: Person) -> None:
+    """Lay a picture, preset the counters, change the height gear, turn, record, strike out."""
     await person.settle()
     await person.press("l")
     await person.choose("left projector: lay")
@@ -77,22 +77,22 @@ async def a_beginning(person: Person) -> None:
     await person.press("up", "enter", "x")
 
 
-def standing(console: Console) -> tuple[Any, ...]:
+def state_of(console: Console) -> tuple[Any, ...]:
     assert console.dials is not None
     return console.dials, console.entries, console.presets
 
 
-def events_differ(folder: Path) -> list[object]:
+def replay_differences(folder: Path) -> list[object]:
     replay = Replay(read_journal(folder / JOURNAL))
     return [difference for _, _, difference in replay_lines(replay) if difference is not None]
 
 
-def test_who_left_is_asked_and_goes_on_where_it_stood(data: Path) -> None:
-    left: list[tuple[Any, ...]] = []
+def test_a_resumed_session_continues_from_its_last_state(data: Path) -> None:
+    states: list[tuple[Any, ...]] = []
 
     async def first(person: Person) -> None:
-        await a_beginning(person)
-        left.append(standing(person.console))
+        await first_actions(person)
+        states.append(state_of(person.console))
 
     async def second(person: Person) -> None:
         await person.until(lambda: person.console.screen.query(OptionList))
@@ -100,105 +100,105 @@ def test_who_left_is_asked_and_goes_on_where_it_stood(data: Path) -> None:
         await person.choose("resume the session")
         await person.until(lambda: len(person.console.entries) == 2)
         await person.settle()
-        assert standing(person.console) == left[0]
+        assert state_of(person.console) == states[0]
         assert [entry.struck for entry in person.console.entries] == [False, True]
         await person.press("right")
         assert person.console.dials.counters["X"] == "5003.00"
 
-    folder = sat_at(place(), first)
+    folder = folder_after(local_console(), first)
     assert folder == data / "sessions" / "akwanga"
-    assert sat_at(place(), second) == folder
-    assert events_differ(folder) == []
+    assert folder_after(local_console(), second) == folder
+    assert replay_differences(folder) == []
 
 
-def test_who_begins_anew_keeps_the_old_session(data: Path) -> None:
-    old = sat_at(place(), a_beginning)
+def test_a_new_session_keeps_the_old_session(data: Path) -> None:
+    old = folder_after(local_console(), first_actions)
     bytes_of_old = (old / JOURNAL).read_bytes()
 
-    async def anew(person: Person) -> None:
+    async def start_new(person: Person) -> None:
         await person.choose("start a new session")
         await person.settle()
         assert person.console.entries == () and person.console.dials.pictures == ("", "")
         await person.press("right")
 
-    async def again(person: Person) -> None:
+    async def resume_last(person: Person) -> None:
         await person.settle()
-        assert person.console.dials.counters["X"] == "1.00", "the last session is the one gone on with"
+        assert person.console.dials.counters["X"] == "1.00", "the last session is the one resumed"
 
-    new = sat_at(place(), anew)
+    new = folder_after(local_console(), start_new)
     assert new == data / "sessions" / "akwanga-2"
     assert (old / JOURNAL).read_bytes() == bytes_of_old
-    assert sat_at(place(go_on=True), again) == new
-    assert sat_at(place(go_on=False), anew_unasked) == data / "sessions" / "akwanga-3"
+    assert folder_after(local_console(resume=True), resume_last) == new
+    assert folder_after(local_console(resume=False), expect_new_session) == data / "sessions" / "akwanga-3"
 
 
-async def anew_unasked(person: Person) -> None:
+async def expect_new_session(person: Person) -> None:
     await person.settle()
     assert person.console.dials.counters["X"] == "0.00"
 
 
-def test_only_what_was_done_at_the_same_scenario_and_seed_is_offered() -> None:
-    first = sat_at(place(), a_beginning)
-    other = sat_at(place(seed=8), anew_unasked)
+def test_only_a_session_of_the_same_scenario_and_seed_is_offered() -> None:
+    first = folder_after(local_console(), first_actions)
+    other = folder_after(local_console(seed=8), expect_new_session)
     assert other != first
-    assert sat_at(place(seed=8), anew_unasked) == other, "where nothing was done there is nothing to ask"
+    assert folder_after(local_console(seed=8), expect_new_session) == other, "a session without actions is reused"
 
 
-def test_a_session_that_cannot_be_gone_on_with_is_kept_and_said_so(tmp_path: Path) -> None:
+def test_a_damaged_session_is_kept_and_the_message_reports_it(tmp_path: Path) -> None:
     out = tmp_path / "mine"
-    assert sat_at(place(out), a_beginning) == out
+    assert folder_after(local_console(out), first_actions) == out
     journal = out / JOURNAL
     journal.write_bytes(journal.read_bytes().replace(b"PRES 5000", b"PRES 5001", 1))
 
-    async def told(person: Person) -> None:
+    async def check_message(person: Person) -> None:
         await person.settle()
         assert "new session: the last one cannot be resumed" in person.message()
         assert "the journal is damaged" in person.message()
 
     with pytest.raises(A7SimError, match=r"--resume: expected a session of akwanga .* damaged"):
-        place(out, go_on=True)
-    assert sat_at(place(out), told) == tmp_path / "mine-2"
+        local_console(out, resume=True)
+    assert folder_after(local_console(out), check_message) == tmp_path / "mine-2"
 
 
-def test_a_folder_of_something_else_is_not_touched(tmp_path: Path) -> None:
+def test_a_folder_without_a_session_is_not_changed(tmp_path: Path) -> None:
     (tmp_path / "letters").mkdir()
     with pytest.raises(A7SimError, match="expected a folder that does not exist yet"):
-        place(tmp_path / "letters")
+        local_console(tmp_path / "letters")
     with pytest.raises(A7SimError, match=r"--resume: expected a session of akwanga at seed 7 .* found none"):
-        place(go_on=True)
+        local_console(resume=True)
     assert list((tmp_path / "letters").iterdir()) == []
 
 
-def test_where_somebody_sits_nobody_else_goes_on() -> None:
-    taken: list[Path | None] = []
+def test_a_session_in_use_cannot_be_resumed() -> None:
+    folders: list[Path | None] = []
 
     async def first(person: Person) -> None:
         await person.settle()
         await person.press("right")
-        elsewhere = place()
-        assert elsewhere.config.resumable() is None
-        assert "the session is in use" in elsewhere.config.greeting()
-        elsewhere.config.connect().close()
-        taken.append(elsewhere.close())
+        second = local_console()
+        assert second.config.resumable() is None
+        assert "the session is in use" in second.config.greeting()
+        second.config.connect().close()
+        folders.append(second.close())
 
-    folder = sat_at(place(), first)
-    assert taken == [folder.with_name("akwanga-2")]
+    folder = folder_after(local_console(), first)
+    assert folders == [folder.with_name("akwanga-2")]
 
 
-def test_escape_from_the_question_leaves_and_begins_nothing(data: Path) -> None:
-    folder = sat_at(place(), a_beginning)
+def test_escape_from_the_question_ends_the_console_without_a_session(data: Path) -> None:
+    folder = folder_after(local_console(), first_actions)
     before = (folder / JOURNAL).read_bytes()
-    here = place()
-    console = Console(here.config)
+    local = local_console()
+    console = Console(local.config)
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=(80, 24)) as pilot:
             person = Person(pilot)
             await person.until(lambda: console.screen.query(OptionList))
             await pilot.press("escape")
 
-    asyncio.run(sit_down())
-    assert here.close() is None
+    asyncio.run(perform())
+    assert local.close() is None
     assert (folder / JOURNAL).read_bytes() == before
     assert [each.name for each in (data / "sessions").iterdir()] == ["akwanga"]
 
@@ -208,14 +208,14 @@ class Terminal:
 
     def __init__(self, *options: str) -> None:
         self.shown = b""
-        self._end, far = pty.openpty()
-        fcntl.ioctl(far, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
+        self._end, far_end = pty.openpty()
+        fcntl.ioctl(far_end, termios.TIOCSWINSZ, struct.pack("HHHH", 30, 100, 0, 0))
         environment = {**os.environ, "TERM": "xterm-256color", "LC_ALL": "C.UTF-8"}
         command = [sys.executable, "-m", "a7sim", "console", *options]
         self.process = subprocess.Popen(
-            command, stdin=far, stdout=far, stderr=far, env=environment, start_new_session=True
+            command, stdin=far_end, stdout=far_end, stderr=far_end, env=environment, start_new_session=True
         )
-        os.close(far)
+        os.close(far_end)
 
     def until(self, holds: Callable[[], object]) -> None:
         end = time.monotonic() + TIMEOUT_S
@@ -225,7 +225,7 @@ class Terminal:
                 self.shown += os.read(self._end, 1 << 16)
 
     def press(self, keys: bytes, shows: bytes = b"") -> None:
-        """Press keys, and wait until something is shown of which the screen showed nothing before."""
+        """Press keys and wait until the terminal has received `shows`."""
         self.shown = b""
         os.write(self._end, keys)
         self.until(lambda: shows in self.shown)
@@ -236,28 +236,28 @@ class Terminal:
         os.close(self._end)
 
 
-def test_after_kill_9_nothing_that_was_recorded_is_lost(data: Path) -> None:
+def test_sigkill_loses_no_recorded_reading(data: Path) -> None:
     journal = data / "sessions" / "akwanga" / JOURNAL
 
-    def said() -> bytes:
+    def journal_bytes() -> bytes:
         return journal.read_bytes() if journal.exists() else b""
 
     terminal = Terminal("akwanga", "--seed", str(SEED))
     try:
         terminal.press(b"\x1b[C\x1b[C")
-        terminal.until(lambda: said().count(b"WHE:X 1") == 2)
+        terminal.until(lambda: journal_bytes().count(b"WHE:X 1") == 2)
         terminal.press(b":", shows=b"a line of the command language")
         terminal.press(b"SYST:LOCK:REQ?\r")
-        terminal.until(lambda: b"LOCK" in said())
+        terminal.until(lambda: b"LOCK" in journal_bytes())
         terminal.press(b"\r", shows=b"name of the point")
         terminal.press(b"P1\r")
-        terminal.until(lambda: b"REC:LAST?" in said())
+        terminal.until(lambda: b"REC:LAST?" in journal_bytes())
         terminal.press(b"\x1b[A\r")
-        terminal.until(lambda: said().count(b"REC:LAST?") == 2)
+        terminal.until(lambda: journal_bytes().count(b"REC:LAST?") == 2)
     finally:
         terminal.kill()
 
-    async def afterwards(person: Person) -> None:
+    async def check_resumed(person: Person) -> None:
         await person.until(lambda: len(person.console.entries) == 2)
         await person.settle()
         assert [(entry.point, entry.counters) for entry in person.console.entries] == [
@@ -265,11 +265,11 @@ def test_after_kill_9_nothing_that_was_recorded_is_lost(data: Path) -> None:
             ("P1", ("2.00", "1.00", "-300.00")),
         ]
         assert person.console.dials.counters == {"X": "2.00", "Y": "1.00", "Z": "-300.00"}
-        assert here._interactive._instrument.lock_holder == "client2", "the lock that was held is taken again"
+        assert local._interactive._instrument.lock_holder == "client2", "the lock is restored"
 
-    here = place(go_on=True)
-    assert sat_at(here, afterwards) == journal.parent
-    assert events_differ(journal.parent) == []
+    local = local_console(resume=True)
+    assert folder_after(local, check_resumed) == journal.parent
+    assert replay_differences(journal.parent) == []
 
 
 @pytest.mark.parametrize(
@@ -284,12 +284,12 @@ def test_after_kill_9_nothing_that_was_recorded_is_lost(data: Path) -> None:
         (["akwanga", "--resume"], "--resume: expected a session of akwanga at seed"),
     ],
 )
-def test_what_cannot_be_done_is_one_sentence_and_exit_2(
+def test_wrong_options_of_the_console_are_one_sentence_and_exit_code_2(
     arguments: list[str], words: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["a7sim", "console", *arguments])
     with pytest.raises(SystemExit) as ended:
         main()
-    said = capsys.readouterr().err
+    message = capsys.readouterr().err
     assert ended.value.code == 2
-    assert words in said and said.count("\n") == 1
+    assert words in message and message.count("\n") == 1

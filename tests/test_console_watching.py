@@ -1,4 +1,4 @@
-"""Watching at the console: a session that is over, on and back, or an instrument that somebody works; hands are off."""
+"""Watching at the console: playback of a recording or a view of a live instrument, without moving anything."""
 
 import asyncio
 import math
@@ -46,7 +46,7 @@ WORK = [
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A session of 17 lines, ten seconds apart, with a checkpoint every ten events."""
+    """Return the folder of a session of 17 lines, ten seconds apart, with a checkpoint every ten events."""
     folder = tmp_path_factory.mktemp("session")
     scenario = load_scenario("akwanga")
     with pytest.MonkeyPatch.context() as monkeypatch:
@@ -64,26 +64,26 @@ def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def film(session: Path) -> Recording:
+def recording_of(session: Path) -> Recording:
     return open_recording(str(session))
 
 
-def dials_of(a_film: Recording) -> Any:
-    with a_film.open_client() as client:
+def dials_of(recording: Recording) -> Any:
+    with recording.open_client() as client:
         client.send(readouts_query(VARIANTS["A7"]))
         return parse_readouts(VARIANTS["A7"], client.reply())
 
 
-def watched(session: str, sitting: Any, size: tuple[int, int] = (100, 30), **others: Any) -> None:
+def watch(session: str, actions: Any, size: tuple[int, int] = (100, 30), **others: Any) -> None:
     console = Console(replace(playback_console(session), **{"drawing": DrawingMode.HALVES, **others}))
 
-    async def sit_down() -> None:
+    async def perform() -> None:
         async with console.run_test(size=size) as pilot:
             person = Person(pilot)
             await person.settle()
-            await sitting(person)
+            await actions(person)
 
-    asyncio.run(sit_down())
+    asyncio.run(perform())
 
 
 def progress(person: Person) -> str:
@@ -94,70 +94,72 @@ def message_of_eye(person: Person) -> str:
     return " ".join(run.text for row in person.console.query_one("#eye1", EyepieceWidget)._rows for run in row)
 
 
-# --- the film -----------------------------------------------------------------------------------------
+# --- the recording ------------------------------------------------------------------------------------
 
 
-def test_a_film_stands_the_same_whichever_way_it_came_there(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    straight = film(session)
+def test_a_step_of_a_recording_does_not_depend_on_the_jumps_before_it(
+    session: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    straight = recording_of(session)
     assert straight.steps == len(WORK)
-    there = []
+    states = []
     for step in range(straight.steps + 1):
         frame = straight.seek(step)
-        there.append((frame, dials_of(straight)))
+        states.append((frame, dials_of(straight)))
     assert straight.journalled.header["command"] == "serve" and frame.error == ""
-    jumping = film(session)
+    jumping = recording_of(session)
     monkeypatch.setattr(recording_module, "MAX_REPLAYED_LINES", 5)
     for step in (17, 3, 9, 8, 0, 15, 1, 17):
-        assert (jumping.seek(step), dials_of(jumping)) == there[step]
-    assert there[11][1].struck == 0 and there[12][1].struck == 1
-    assert [each.records for _, each in there] == [0] * 4 + [*range(1, 9), 8, 8, *range(9, 13)]
+        assert (jumping.seek(step), dials_of(jumping)) == states[step]
+    assert states[11][1].struck == 0 and states[12][1].struck == 1
+    assert [each.records for _, each in states] == [0] * 4 + [*range(1, 9), 8, 8, *range(9, 13)]
 
 
-def test_checkpoints_make_a_jump_say_few_lines_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_checkpoints_limit_the_replayed_lines_of_a_jump(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recording_module, "MAX_REPLAYED_LINES", 5)
-    jumping = film(session)
-    said: list[int] = []
-    say = jumping._replay.__class__.apply
+    jumping = recording_of(session)
+    replayed: list[int] = []
+    apply = jumping._replay.__class__.apply
     monkeypatch.setattr(
         jumping._replay.__class__,
         "apply",
-        lambda replay, number, event: said.append(number) or say(replay, number, event),
+        lambda replay, number, event: replayed.append(number) or apply(replay, number, event),
     )
     jumping.seek(jumping.steps)
     jumping.seek(jumping.steps - 1)
-    assert len(said) <= 2 * 14 < len(jumping.journalled)
+    assert len(replayed) <= 2 * 14 < len(jumping.journalled)
 
 
-def test_a_film_knows_what_was_done_where(session: Path) -> None:
-    a_film = film(session)
-    assert [a_film.next_record(step, 1) for step in (0, 4, 11, 17)] == [4, 5, 12, None]
-    assert [a_film.next_record(step, -1) for step in (17, 5, 4)] == [16, 4, None]
-    assert a_film.seek(6).point == "P3" and a_film.seek(2).point is None
-    assert (a_film.frame.line, a_film.frame.time) == (f"client1: {WORK[1]}", 20.0)
-    assert a_film.seek(4).origins["X"] == 5000.0
-    assert [a_film.find_step(words) for words in ("7", "70s", "0:01:10", "after the slip", "@2")] == [7, 7, 7, 13, 1]
+def test_a_recording_finds_steps_records_and_notes(session: Path) -> None:
+    recording = recording_of(session)
+    assert [recording.next_record(step, 1) for step in (0, 4, 11, 17)] == [4, 5, 12, None]
+    assert [recording.next_record(step, -1) for step in (17, 5, 4)] == [16, 4, None]
+    assert recording.seek(6).point == "P3" and recording.seek(2).point is None
+    assert (recording.frame.line, recording.frame.time) == (f"client1: {WORK[1]}", 20.0)
+    assert recording.seek(4).origins["X"] == 5000.0
+    assert [recording.find_step(words) for words in ("7", "70s", "0:01:10", "after the slip", "@2")] == [7, 7, 7, 13, 1]
     for words in ("18", "never noted", "@999", "1:00:00"):
         with pytest.raises(A7SimError, match=f"jump to {words}: expected a step up to 17, a time up to 170s"):
-            a_film.find_step(words)
+            recording.find_step(words)
 
 
-def test_what_does_not_happen_again_is_said(session: Path) -> None:
-    there = read_journal(session / "session.jsonl")
-    answers = next(number for number in range(2, len(there)) if there.event(number).dir == "<")
-    there.lines[answers - 1] = there.lines[answers - 1].replace(b'"text":"', b'"text":"9')
-    a_film = Recording(there)
-    assert a_film.seek(3).error == ""
-    assert f"line {answers}: expected again client1 < 9" in a_film.seek(4).error
+def test_a_reply_that_differs_in_playback_is_reported(session: Path) -> None:
+    journal = read_journal(session / "session.jsonl")
+    reply = next(number for number in range(2, len(journal)) if journal.event(number).dir == "<")
+    journal.lines[reply - 1] = journal.lines[reply - 1].replace(b'"text":"', b'"text":"9')
+    recording = Recording(journal)
+    assert recording.seek(3).error == ""
+    assert f"line {reply}: expected again client1 < 9" in recording.seek(4).error
 
 
 @pytest.mark.parametrize(
-    ("watched", "so"), [("tcp://127.0.0.1:5025", True), ("clearing", False), ("runs/akwanga", False)]
+    ("address", "expected"), [("tcp://127.0.0.1:5025", True), ("clearing", False), ("runs/akwanga", False)]
 )
-def test_an_address_is_known_from_a_session(watched: str, so: bool) -> None:
-    assert is_url(watched) is so
+def test_an_address_is_distinguished_from_a_session(address: str, expected: bool) -> None:
+    assert is_url(address) is expected
 
 
-def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> None:
+def test_a_session_without_lines_is_refused_in_one_sentence(tmp_path: Path) -> None:
     scenario = load_scenario("akwanga")
     with Journal().recording(tmp_path, make_header("serve", scenario, 7), None):
         pass
@@ -168,8 +170,8 @@ def test_a_session_in_which_nothing_was_said_is_one_sentence(tmp_path: Path) -> 
 # --- at the console -----------------------------------------------------------------------------------
 
 
-def test_keys_step_through_a_session_and_the_book_follows(session: Path) -> None:
-    async def sitting(person: Person) -> None:
+def test_keys_step_through_a_recording_and_the_book_follows(session: Path) -> None:
+    async def actions(person: Person) -> None:
         console = person.console
         assert progress(person) == f"paused (1x)  step 0 of {len(WORK)}  0:00:00"
         await person.press(".", ".", ".", ".")
@@ -190,11 +192,11 @@ def test_keys_step_through_a_session_and_the_book_follows(session: Path) -> None
         frame = "\n".join(await person.frame())
         assert "space play" in frame and "hands off" in frame and "P7" in frame
 
-    watched(str(session), sitting)
+    watch(str(session), actions)
 
 
-def test_hands_are_off_in_one_sentence_and_nothing_turns(session: Path) -> None:
-    async def sitting(person: Person) -> None:
+def test_in_playback_controls_are_disabled_with_one_sentence(session: Path) -> None:
+    async def actions(person: Person) -> None:
         console = person.console
         await person.press(".", ".")
         before = console.dials
@@ -207,14 +209,14 @@ def test_hands_are_off_in_one_sentence_and_nothing_turns(session: Path) -> None:
         await person.press("m", "tab")
         assert console.dials == before and console.view.magnification == 12.0
 
-    watched(str(session), sitting)
+    watch(str(session), actions)
 
 
-def test_a_session_plays_at_its_pace_to_its_end_and_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_plays_at_its_pace_to_its_end_and_again(session: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     wall = [100.0]
     monkeypatch.setattr("a7sim.console.widgets.playback.monotonic", lambda: wall[0])
 
-    async def sitting(person: Person) -> None:
+    async def actions(person: Person) -> None:
         playback = person.console.playback
 
         async def after(seconds: float) -> int:
@@ -242,27 +244,27 @@ def test_a_session_plays_at_its_pace_to_its_end_and_again(session: Path, monkeyp
         await person.press("[", "[", "[", "space")
         assert playback.frame.step == 0 and playback.playing
 
-    watched(str(session), sitting)
+    watch(str(session), actions)
 
 
-def test_a_script_is_watched_too_and_in_words(session: Path) -> None:
-    async def sitting(person: Person) -> None:
+def test_a_script_can_be_watched_in_words(session: Path) -> None:
+    async def actions(person: Person) -> None:
         await person.press(">")
         assert "REC" in progress(person)
         await person.until(lambda: "1011: image is on the mark" in message_of_eye(person))
         assert person.message() == "1011: no y-parallax, no x-parallax"
 
-    watched("clearing", sitting, size=(80, 24), drawing=DrawingMode.WORDS)
+    watch("clearing", actions, size=(80, 24), drawing=DrawingMode.WORDS)
 
 
-def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothing() -> None:
+def test_a_watching_console_shows_a_live_instrument_and_moves_nothing() -> None:
     with ServerThread(with_model().instrument) as served:
         url = f"tcp://127.0.0.1:{served.port}"
         console = Console(
             replace(remote_console(url, JobSheet("Akwanga"), None, watching=True), drawing=DrawingMode.HALVES)
         )
 
-        async def sit_down() -> None:
+        async def perform() -> None:
             async with console.run_test(size=(100, 30)) as pilot:
                 person = Person(pilot)
                 await person.settle()
@@ -277,4 +279,4 @@ def test_who_watches_a_served_instrument_sees_what_another_does_and_turns_nothin
                     assert operator.ask("COUN:X?;:REC:COUN?;:PROJ1:BY?") == "3.00;2;0.00"
                 assert "m x8" in "\n".join(await person.frame())
 
-        asyncio.run(sit_down())
+        asyncio.run(perform())

@@ -43,7 +43,7 @@ print(computing.Outcome.__name__, computing.written.__name__)
 print(reduction.Stand.__name__, reduction.PlateLie.__name__, reduction.PictureLie.__name__)
 print(reduction.adjusted.__name__, reduction.plate_lie.__name__, reduction.picture_lie.__name__)
 """
-"""The ten public names of release 0.1.0 and what its page of the Python API said of them."""
+"""The ten public names of release 0.1.0, used as on its page of the Python API."""
 
 PRINTED = """\
 [0.0, 0.0, -325.71]
@@ -79,7 +79,7 @@ def test_a_script_of_the_first_release_runs_and_warns(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["Mistake", "InstrumentRefused"])
-def test_an_old_name_warns_once_and_is_none_of_the_public_names(name):
+def test_an_old_name_warns_once_and_is_no_public_name(name):
     with pytest.warns(FutureWarning, match=f"a7sim.{name} is now called") as warned:
         getattr(a7sim, name)
     assert len([each for each in warned if f"a7sim.{name} is" in str(each.message)]) == 1
@@ -93,7 +93,7 @@ def test_an_old_class_method_works_on_the_class():
     assert plotter.element("bx") == Autograph.from_parts(scenario.instrument, {}, 7).element("bx")
 
 
-def test_a_name_that_never_was_is_an_attribute_error():
+def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = a7sim.nothing
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):

@@ -1,4 +1,4 @@
-"""The pages hang together: every page is reached, every link leads somewhere, nothing is fetched (issue 10)."""
+"""The documents: every page is in the navigation, every link has a target, no page fetches from other servers."""
 
 import re
 import shlex
@@ -17,18 +17,18 @@ NAV = re.findall(r"^ +- .*: (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encodin
 
 
 def anchors_of(text):
-    """Return the anchors of a page's headings, as Markdown for the web makes them."""
+    """Return the anchors that MkDocs makes of the headings of a page."""
     headings = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.DOTALL | re.M), re.M)
     return {re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", each.lower()).strip()) for each in headings}
 
 
-def test_the_navigation_names_pages_that_exist_each_once():
+def test_the_navigation_names_each_page_once_and_each_page_exists():
     assert len(set(NAV)) == len(NAV) > 20
     assert [name for name in NAV if not (DOCS / name).is_file()] == []
 
 
-def test_every_page_is_reached():
-    """By the navigation; decisions by their list."""
+def test_every_page_is_in_the_navigation():
+    """Decisions are in their own list."""
     reached = {DOCS / name for name in NAV}
     listed = (DOCS / "decisions" / "index.md").read_text(encoding="utf-8")
     reached |= {DOCS / "decisions" / name for name in re.findall(r"\]\((0\S+\.md)\)", listed)}
@@ -36,38 +36,38 @@ def test_every_page_is_reached():
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(ROOT)) for path in PAGES])
-def test_links_lead_somewhere_within_what_is_built(path):
+def test_every_link_has_a_target_within_the_site(path):
     text = re.sub(r"^```.*?^```$", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.M)
     for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", re.sub(r"`[^`]*`", "", text)):
-        place, _, anchor = target.partition("#")
-        there = (path.parent / place).resolve() if place else path
-        assert there.exists(), target
-        assert path.parent == ROOT or there.is_relative_to(DOCS), f"{target} is outside of the site"
+        file, _, anchor = target.partition("#")
+        target_file = (path.parent / file).resolve() if file else path
+        assert target_file.exists(), target
+        assert path.parent == ROOT or target_file.is_relative_to(DOCS), f"{target} is outside of the site"
         if anchor:
-            assert anchor in anchors_of(there.read_text(encoding="utf-8")), target
+            assert anchor in anchors_of(target_file.read_text(encoding="utf-8")), target
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(ROOT)) for path in PAGES])
-def test_no_diagram_needs_a_script_to_be_drawn(path):
+def test_no_diagram_needs_a_script(path):
     assert "```mermaid" not in path.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(ROOT)) for path in PAGES])
-def test_every_command_on_a_page_is_one_that_the_command_line_takes(path):
+def test_every_command_on_a_page_is_valid(path):
     for line in re.findall(r"^(?:    )?(a7sim [a-z].*)$", path.read_text(encoding="utf-8"), re.M):
         for each in without_alternatives(re.split(r"  #| [<>] ", line)[0]):
-            taken(shlex.split(each, comments=True)[1:], line)
+            parse(shlex.split(each, comments=True)[1:], line)
 
 
 def without_alternatives(line):
-    """Return a line without what may be left out, once for each of what may stand there: `book|forms`."""
+    """Return a line without optional parts, once for each alternative of words such as `book|forms`."""
     line = re.sub(r" \[[^\]]*\]", "", line)
     several = re.search(r"(?<= )[a-z]+(?:\|[a-z]+)+(?= |$)", line)
     return [line.replace(several[0], word) for word in several[0].split("|")] if several else [line]
 
 
-def taken(words, line):
-    """Let click read a command without doing it; what a reader has in their folder is not there."""
+def parse(words, line):
+    """Parse a command with click without running it; ignore a missing file of the reader."""
     command, context = cli, click.Context(cli, info_name="a7sim")
     while isinstance(command, click.Group):
         name, command, words = command.resolve_command(context, words)
@@ -85,7 +85,7 @@ def taken(words, line):
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("mkdocs") is None, reason="mkdocs is not installed: make docs installs it")
-def test_the_site_is_built_without_a_warning_and_fetches_nothing(tmp_path):
+def test_the_site_is_built_without_a_warning_and_fetches_from_no_other_server(tmp_path):
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
     built = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=120)
     assert built.returncode == 0, built.stderr

@@ -1,4 +1,4 @@
-"""Empirical relative orientation at the link, and Hallert's closed forms and the measuring element at the bench."""
+"""Empirical relative orientation over the link; Hallert's closed forms and the measuring element in orientation."""
 
 import dataclasses
 from contextlib import suppress
@@ -48,12 +48,12 @@ METHODS = pytest.mark.parametrize("method", ["independent", "dependent"])
 EMPIRICAL = {"plan.procedure": '"empirical"'}
 TWO_GON_OFF = EMPIRICAL | {"plan.start_off_gon": "2"}
 READ_ONCE = {"plan.parallax_readings": "1"}
-"""For what more readings do not change."""
+"""For tests whose result does not depend on the number of readings."""
 SEEDS = range(50)
 
 
 class _IsReady(Exception):
-    """The model is mounted and centred; relative orientation would begin."""
+    """Raised when the model is mounted and centred and relative orientation would begin."""
 
 
 def _stop_at_relative_orientation(activity):
@@ -61,25 +61,25 @@ def _stop_at_relative_orientation(activity):
         raise _IsReady
 
 
-def ready(scenario, seed, model=0, change=lambda job: job):
-    """A bench with one model of a scenario mounted, and its session."""
+def session_with_model(scenario, seed, model=0, change=lambda job: job):
+    """Return a session and its workstation with one model of a scenario mounted and centred."""
     session = open_session(scenario, seed)
     job = dataclasses.replace(session.job, models=(change(session.job.models[model]),))
-    return session, made_ready(OperatorBatch.single(session.person), ScpiDriver(session.person), job)
+    return session, workstation_with_model(OperatorBatch.single(session.person), ScpiDriver(session.person), job)
 
 
-def made_ready(crew, hands, job):
-    workstation = Workstation(crew, hands, job)
+def workstation_with_model(operators, driver, job):
+    workstation = Workstation(operators, driver, job)
     with suppress(_IsReady):
         next(measure_models_batch(workstation, _stop_at_relative_orientation))
-    crew.begin(crew.active, job.models[0].name, "relative orientation")
+    operators.begin(operators.active, job.models[0].name, "relative orientation")
     return workstation
 
 
 def orient(scenario, seed, model=0, change=lambda job: job):
-    """The relative orientation of one model of a scenario, and the book."""
-    session, bench = ready(scenario, seed, model, change)
-    return orient_model(bench, bench.job.models[0]).for_session(0), session.person.book
+    """Return the relative orientation of one model of a scenario, and the book."""
+    session, workstation = session_with_model(scenario, seed, model, change)
+    return orient_model(workstation, workstation.job.models[0]).for_session(0), session.person.book
 
 
 def akwanga(method="independent", **overrides):
@@ -87,7 +87,7 @@ def akwanga(method="independent", **overrides):
 
 
 def without(*labels):
-    """A change of a job after which a model has lost standard points."""
+    """Return a function that removes standard points from a job."""
 
     def change(job):
         left = {label: name for label, name in job.standard_points.items() if label not in labels}
@@ -114,21 +114,21 @@ POSITIONS = {"independent": "21436", "dependent": "21436"}
 
 @METHODS
 @pytest.mark.parametrize(("d", "z"), [(181.3, 325.7), (90.0, 200.0), (200.0, 200.0), (60.0, 400.0)])
-def test_over_flat_ground_the_over_correction_is_the_text_books(method, d, z):
-    """geometry.md: n = (1 + z^2/d^2)/2, which knows neither the base nor the method."""
+def test_over_flat_ground_the_over_correction_equals_the_textbook_formula(method, d, z):
+    """geometry.md: n = (1 + z^2/d^2)/2, independent of the base and the method."""
     coefficients = coefficients_at(ELEMENTS[method], POSITIONS[method], 195.0, d, z)
     assert over_correction_by_coefficients(coefficients) == pytest.approx(over_correction(z, d), rel=1e-12)
 
 
-def test_an_over_correction_is_not_a_number_where_the_four_points_cannot_be_cleared():
+def test_the_over_correction_is_nan_if_the_four_points_cannot_be_cleared():
     coefficients = coefficients_at(ELEMENTS["dependent"], "21226", 195.0, 180.0, 325.0)
     assert np.isnan(over_correction_by_coefficients(coefficients))
 
 
 @pytest.mark.parametrize("n", ["1", "1.4"])
 @METHODS
-def test_the_parallax_at_the_last_point_shrinks_as_the_parallax_equation_says(monkeypatch, method, n):
-    """By 1 - n/n0 a round, n0 = (1 + z^2/d^2)/2; the rounds that count are those with parallaxes well above a count."""
+def test_the_parallax_at_the_last_point_shrinks_by_the_parallax_equation(monkeypatch, method, n):
+    """The factor is 1 - n/n0 a round, n0 = (1 + z^2/d^2)/2; only rounds with parallaxes well above a count are used."""
     monkeypatch.setattr(empirical, "MAX_ROUNDS", 6)
     rough = {"plan.tolerated_parallax_um": "1000"}
     off = TWO_GON_OFF | rough | {"plan.over_correction": n, "terrain.relief": "0", "plan.method": f'"{method}"'}
@@ -141,18 +141,18 @@ def test_the_parallax_at_the_last_point_shrinks_as_the_parallax_equation_says(mo
     np.testing.assert_allclose(ratios, expected, atol=0.06)
 
 
-# --- what must be shown ---------------------------------------------------------------------------------
+# --- accuracy and rounds --------------------------------------------------------------------------------
 
 
 def _cleared(seeds, method, **overrides):
-    """Rounds, rms, points and first parallax at the last point ``(seeds, 4)``; base in and out by turns."""
+    """Return rounds, rms, points and first parallax at the last point ``(seeds, 4)``; base in and out in turn."""
     scenario = load_scenario("akwanga", TWO_GON_OFF | {"plan.method": f'"{method}"'} | overrides)
     found = {}
     for model in (0, 1):
         batch = open_batch(scenario, [seed for seed in seeds if seed % 2 == model])
         job = dataclasses.replace(batch.job, models=(batch.job.models[model],))
         orientations = orient_model(
-            made_ready(batch.workstation.operators, batch.workstation.driver, job), job.models[0]
+            workstation_with_model(batch.workstation.operators, batch.workstation.driver, job), job.models[0]
         )
         assert batch.workstation.operators.reasons == {}
         found |= {seed: orientations.for_session(session) for session, seed in enumerate(batch.seeds)}
@@ -162,12 +162,12 @@ def _cleared(seeds, method, **overrides):
 
 @cache
 def sweep():
-    """Akwanga with its default operator from up to 2 gon, both methods, 50 seeds each."""
+    """Return the results of Akwanga with its default operator from up to 2 gon, both methods, 50 seeds each."""
     return np.concatenate([_cleared(SEEDS, method) for method in ELEMENTS])
 
 
 @pytest.mark.slow
-def test_from_two_gon_both_methods_leave_what_the_issue_asks_for_within_six_rounds():
+def test_from_two_gon_both_methods_reach_the_required_rms_within_six_rounds():
     for of_method in np.split(sweep(), len(ELEMENTS)):
         rounds, rms, points, _ = of_method.T
         assert len(rms) == 50
@@ -179,8 +179,8 @@ def test_from_two_gon_both_methods_leave_what_the_issue_asks_for_within_six_roun
 
 
 @pytest.mark.slow
-def test_clearing_the_last_point_and_no_more_takes_eight_rounds_where_the_over_correction_takes_three():
-    """From more than 2 mm at the last point."""
+def test_without_over_correction_eight_rounds_are_needed_instead_of_three():
+    """From parallaxes of more than 2 mm at the last point."""
     computed = sweep()[: len(SEEDS)]
     gross = np.flatnonzero(computed[:, 3] > 2.0)[:6]
     plain = _cleared(gross.tolist(), "independent", **{"plan.over_correction": "1", "plan.parallax_readings": "1"})
@@ -199,8 +199,8 @@ TILTS = {
 @METHODS
 @pytest.mark.parametrize("model", [0, 1])
 @pytest.mark.parametrize("tilts", list(TILTS))
-def test_without_errors_nothing_is_left_but_counts_at_any_tilt_and_base(method, model, tilts):
-    """Half a count of kappa is 0.015 mm, and of omega with the others following as much."""
+def test_without_errors_only_counts_remain_at_any_tilt_and_base(method, model, tilts):
+    """Half a count of kappa is 0.015 mm; half a count of omega with its effect on the other elements is as large."""
     found, _ = orient(tilted_flight(TILTS[tilts], **EMPIRICAL, **{"plan.method": f'"{method}"'}), 4, model)
     assert found.procedure == "empirical"
     assert len(found.rounds) <= 5
@@ -208,7 +208,7 @@ def test_without_errors_nothing_is_left_but_counts_at_any_tilt_and_base(method, 
     assert max(abs(p) for p in found.residuals.values()) < 0.06
 
 
-# --- the order of things --------------------------------------------------------------------------------
+# --- the order of clearing ------------------------------------------------------------------------------
 
 ORDERS = {
     ("dependent", 0): [("2", "by2"), ("1", "kappa2"), ("4", "bz2"), ("3", "phi2"), ("6", "omega2")],
@@ -219,11 +219,11 @@ ORDERS = {
 
 
 @pytest.mark.parametrize(("method", "model"), list(ORDERS))
-def test_the_book_shows_what_was_cleared_where_in_the_order_of_the_text_books(method, model):
-    """Model 2 has the base out: the right-hand photograph, the new one, lies in projector 1."""
-    session, bench = ready(akwanga(method, **READ_ONCE), 3, model)
-    job = bench.job.models[0]
-    orient_model(bench, job)
+def test_the_book_shows_points_and_elements_in_the_order_of_the_textbook(method, model):
+    """Model 2 has the base out: the new, right-hand photograph is in projector 1."""
+    session, workstation = session_with_model(akwanga(method, **READ_ONCE), 3, model)
+    job = workstation.job.models[0]
+    orient_model(workstation, job)
     first_round = [e for e in session.person.book.entries if e.form == "relative orientation" and e.round == 1]
     turned = [(e.point, e.item) for e in first_round if e.item[:-1] in ("by", "bz", "kappa", "phi", "omega")]
     expected = [(job.standard_points[label], element) for label, element in ORDERS[method, model]]
@@ -232,7 +232,7 @@ def test_the_book_shows_what_was_cleared_where_in_the_order_of_the_text_books(me
     assert set(turned) == set(expected)
 
 
-def test_the_book_and_the_rounds_show_the_parallaxes_narrowing_down():
+def test_the_book_and_the_rounds_show_decreasing_parallaxes():
     found, book = orient(load_scenario("akwanga", TWO_GON_OFF | READ_ONCE), 1)
     rms = [each.rms for each in found.rounds]
     assert len(rms) >= 2
@@ -252,7 +252,7 @@ def test_the_book_and_the_rounds_show_the_parallaxes_narrowing_down():
     ]
 
 
-def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch):
+def test_start_perturbations_reach_two_gon_on_both_sides_and_never_exceed_it(monkeypatch):
     def only_set_off(*given):
         perturb_elements(*given)
         raise _IsReady
@@ -260,9 +260,9 @@ def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch)
     monkeypatch.setattr(import_module("a7sim.operator.procedures.models"), "perturb_elements", only_set_off)
     off = []
     for seed in range(6):
-        session, bench = ready(without_errors(load_scenario("akwanga", TWO_GON_OFF)), seed)
+        session, workstation = session_with_model(without_errors(load_scenario("akwanga", TWO_GON_OFF)), seed)
         with pytest.raises(_IsReady):
-            orient_model(bench, bench.job.models[0])
+            orient_model(workstation, workstation.job.models[0])
         entries = session.person.book.entries
         at = next(i for i, entry in enumerate(entries) if "set off" in entry.remark)
         off += [(float(e.reading) % 100.0 + 50.0) % 100.0 - 50.0 for e in entries[at + 1 : at + 6]]
@@ -274,8 +274,8 @@ def test_setting_off_reaches_two_gon_on_both_sides_and_never_beyond(monkeypatch)
 # --- mountains and water --------------------------------------------------------------------------------
 
 
-def test_in_mountains_the_places_of_the_points_tell_the_over_correction():
-    """Heights from 292 to 360 mm below the base: n is 2.8 where the text book's mean one is 2.1."""
+def test_in_mountains_the_over_correction_follows_from_the_places_of_the_points():
+    """Heights are 292 to 360 mm below the base: n is 2.8, and 2.1 from the mean height by the textbook formula."""
     mountains = {"terrain.relief": "300", "plan.start_off_gon": "2"}
     computed, plain = (
         orient(without_errors(akwanga("dependent", **mountains, **each)), 3, 1)[0]
@@ -299,7 +299,7 @@ INCOMPLETE = {
 
 @METHODS
 @pytest.mark.parametrize("missing", list(INCOMPLETE))
-def test_with_a_corner_under_water_the_others_are_used(method, missing):
+def test_with_a_corner_under_water_the_other_points_are_used(method, missing):
     last, first = INCOMPLETE[missing]
     found, book = orient(akwanga(method, **READ_ONCE), 8, 0, without(missing))
     omega = next(entry.point for entry in book.entries if entry.item.startswith("omega") and entry.round)
@@ -310,7 +310,7 @@ def test_with_a_corner_under_water_the_others_are_used(method, missing):
     assert len(found.rounds) <= 5
 
 
-def test_the_points_in_between_serve_where_the_case_has_them():
+def test_intermediate_points_replace_a_missing_point_if_the_case_has_them():
     (job,) = open_session(akwanga(), 1).job.models[:1]
     steps = clearing_steps("dependent", job, without("6", "i")(job).points_of_case("E"))
     assert [step.position for step in steps] == ["2", "1", "4", "3", "f"]
@@ -320,12 +320,12 @@ def test_the_points_in_between_serve_where_the_case_has_them():
 
 
 @pytest.mark.parametrize("missing", ["56", "36"])
-def test_with_too_few_points_left_the_operator_says_which_are_missing(missing):
+def test_with_too_few_points_the_error_message_names_the_missing_points(missing):
     with pytest.raises(OperatorGaveUp, match=f"{missing[0]}, {missing[1]} of the standard points cannot be used"):
         orient(akwanga(), 8, 0, without(*missing))
 
 
-def test_a_point_that_is_pricked_on_one_print_only_is_done_without(monkeypatch):
+def test_a_point_pricked_on_only_one_print_is_left_out(monkeypatch):
     prints = ScpiDriver.prints
     monkeypatch.setattr(
         ScpiDriver,
@@ -337,13 +337,15 @@ def test_a_point_that_is_pricked_on_one_print_only_is_done_without(monkeypatch):
     assert "6" not in found.residuals
 
 
-def test_a_point_whose_images_do_not_come_together_is_done_without(monkeypatch):
-    session, bench = ready(akwanga(**READ_ONCE), 8)
-    fuse = bench.mark.fuse
+def test_a_point_whose_images_cannot_be_fused_is_left_out(monkeypatch):
+    session, workstation = session_with_model(akwanga(**READ_ONCE), 8)
+    fuse = workstation.mark.fuse
     monkeypatch.setattr(
-        bench.mark, "fuse", lambda active, point, judged: active[:0] if point == "1025" else fuse(active, point, judged)
+        workstation.mark,
+        "fuse",
+        lambda active, point, judged: active[:0] if point == "1025" else fuse(active, point, judged),
     )
-    found = orient_model(bench, bench.job.models[0]).for_session(0)
+    found = orient_model(workstation, workstation.job.models[0]).for_session(0)
     assert set(found.rounds[-1].parallaxes) == set("12345")
     assert "6" not in found.residuals
     assert any("images of 1025 cannot be fused: done without" in remark for remark in session.person.book.remarks)
@@ -361,7 +363,7 @@ def test_a_point_whose_images_do_not_come_together_is_done_without(monkeypatch):
         ("kappa1", "kappa2", "phi1", "phi2", "omega2"),
     ],
 )
-def test_closed_forms_are_the_least_squares_solution_on_the_pattern(count, unknowns):
+def test_closed_forms_equal_the_least_squares_solution_on_the_regular_pattern(count, unknowns):
     b, d, h = 195.0, 181.0, 326.0
     p = 0.05 * np.random.default_rng(7).standard_normal((count, 40))
     x, y = np.array(REGULAR_POINTS)[:, :count, None]
@@ -379,7 +381,7 @@ def test_closed_forms_are_the_least_squares_solution_on_the_pattern(count, unkno
 
 
 def relative_of(elements, corrections=None):
-    """Relative rotation and base direction in the left photograph's frame that counters (base in) describe."""
+    """Return relative rotation and base direction in the frame of the left photograph from the elements (base in)."""
     e = {name: value + (corrections or {}).get(name, 0.0) for name, value in elements.items()}
     turns = [
         rotation(*(GON * (e[f"{name}{n}"] - zero) for name, zero in (("omega", 100), ("phi", 100), ("kappa", 0))))
@@ -390,7 +392,7 @@ def relative_of(elements, corrections=None):
 
 
 def images_of(found, labels, c):
-    """The image points ``(2, n)`` of both photographs as the parallaxes left at points and their places tell them."""
+    """Return the image points ``(2, n)`` of both photographs from places and residual parallaxes of points."""
     places = np.array([found.places[label] for label in labels]).T * [[1.0], [1.0], [-1.0]]
     half = np.array([found.residuals[label] for label in labels]) / 2.0
     e = found.elements
@@ -406,11 +408,11 @@ def images_of(found, labels, c):
 
 @pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
-def test_same_observations_four_methods_one_orientation(procedure, seed):
-    """The parallaxes left at the six points of a model: least squares, Hallert, coplanarity and Schut.
+def test_four_methods_give_one_orientation_from_the_same_observations(procedure, seed):
+    """Residual parallaxes at the six points of a model, solved by least squares, Hallert, coplanarity and Schut.
 
-    They differ by a tenth of what one parallax's error makes of the elements (0.14 sigma measured), and each says that
-    the settings as they stand are off by more than a sigma.
+    The solutions differ by a tenth of the effect of one parallax error on the elements (0.14 sigma measured). Each
+    differs from the current settings by more than a sigma.
     """
     scenario = load_scenario("akwanga", {"plan.method": '"dependent"', "plan.procedure": f'"{procedure}"'})
     found, _ = orient(scenario, seed)
@@ -421,13 +423,13 @@ def test_same_observations_four_methods_one_orientation(procedure, seed):
     names = ("by2", "bz2", "kappa2", "phi2", "omega2")
     units = np.array([1.0, 1.0, GON, GON, GON])
 
-    def stand(n, x):
+    def pose_of(n, x):
         angles = [e[f"{name}{n}"] - zero for name, zero in (("omega", 100), ("phi", 100), ("kappa", 0))]
         return ProjectorPose(
             np.array([x, -e[f"by{n}"], e[f"bz{n}"]]), GON * ((np.array(angles) + 200.0) % 400.0 - 200.0)
         )
 
-    by_squares = element_corrections(p, places * [[1.0], [1.0], [-1.0]], stand(1, 0.0), stand(2, bx), names)
+    by_squares = element_corrections(p, places * [[1.0], [1.0], [-1.0]], pose_of(1, 0.0), pose_of(2, bx), names)
     by_hallert, _ = regular_corrections(p, bx, abs(places[1, 2:]).mean(), places[2].mean(), names)
     images = images_of(found, labels, c)
     rigorous = relative_orientation(*images, c, c, "dependent", bx=bx)
@@ -449,10 +451,10 @@ def test_same_observations_four_methods_one_orientation(procedure, seed):
 
 
 @pytest.mark.parametrize(("method", "case"), [("dependent", "A"), ("independent", "D")])
-def test_hallerts_closed_forms_orient_at_the_bench_as_least_squares_do(method, case):
-    """Same seed, same photographs: element by element within three of the sigmas of both, and a count for each.
+def test_hallerts_closed_forms_orient_like_least_squares(method, case):
+    """With the same seed, each element agrees within three sigmas of both solutions and a count for each.
 
-    Each form and each method once; that every form is least squares for every method is held on the pattern above.
+    Each form and each method are used once; the test on the regular pattern above covers all combinations.
     """
     found = []
     for solution in ("least squares", "hallert"):
@@ -466,7 +468,7 @@ def test_hallerts_closed_forms_orient_at_the_bench_as_least_squares_do(method, c
     assert max(each.rms for each in found) < 0.03
 
 
-def test_off_the_pattern_hallert_gives_way_to_least_squares_and_the_book_says_so():
+def test_off_the_regular_pattern_least_squares_replace_hallert_and_the_book_notes_it():
     mountains = {"terrain.relief": "300", "plan.solution": '"hallert"'}
     found, book = orient(without_errors(load_scenario("akwanga", mountains)), 3)
     assert any("off the pattern, so by least squares" in remark for remark in book.remarks)
@@ -483,10 +485,10 @@ def test_parallaxes_are_measured_with_the_element_that_the_plan_names(element, o
     assert found.rms < 0.03
 
 
-# --- what is said of it ---------------------------------------------------------------------------------
+# --- results and mistakes -------------------------------------------------------------------------------
 
 
-def test_results_and_tables_tell_how_a_model_was_cleared(capsys):
+def test_results_and_tables_show_the_rounds_of_a_model(capsys):
     scenario = akwanga(**{"plan.start_off_gon": "2"} | READ_ONCE)
     document = run(msgspec.structs.replace(scenario, models=scenario.models[:1]), 1)
     assert document["status"] == "complete"
@@ -503,12 +505,12 @@ def test_results_and_tables_tell_how_a_model_was_cleared(capsys):
 @pytest.mark.parametrize(
     ("key", "value"), [("plan.over_correction", "0"), ("plan.procedure", '"by guess"'), ("plan.start_off_gon", "5")]
 )
-def test_a_plan_that_cannot_be_is_a_mistake(key, value):
+def test_an_impossible_plan_is_a_mistake(key, value):
     with pytest.raises(A7SimError, match=key):
         load_scenario("akwanga", {key: value})
 
 
-def test_hallerts_forms_are_for_six_and_nine_points_and_fifteen_go_by_least_squares():
+def test_fifteen_points_are_solved_by_least_squares_instead_of_hallerts_forms():
     plan = {"plan.solution": '"hallert"', "plan.case": '"E"', "plan.parallax_readings": "1"}
     found, _ = orient(load_scenario("akwanga", plan), 2)
     by_squares, _ = orient(load_scenario("akwanga", plan | {"plan.solution": '"least squares"'}), 2)

@@ -1,4 +1,4 @@
-"""benchmarks/fuzz_language.py finds a promise that is broken, and none is by a few thousand lines (issue 5)."""
+"""benchmarks/fuzz_language.py finds a broken promise; some thousand random lines break none (issue 5)."""
 
 import pytest
 
@@ -18,13 +18,13 @@ def fuzzed(fuzzing):
         yield fuzzing.Fuzzed(instrument, numbers)
 
 
-def test_no_promise_is_broken_by_lines_at_random(fuzzing):
+def test_random_lines_break_no_promise(fuzzing):
     tally = fuzzing.fuzz(3000, seed=7)
     assert tally["lines"] == 3000
     assert min(tally["replies"], tally["-113"], tally["-222"], tally["-203"], tally["-363"]) > 0
 
 
-def test_the_same_seed_writes_the_same_lines(fuzzing):
+def test_the_same_seed_makes_the_same_lines(fuzzing):
     first, again, other = (fuzzing.Author(seed) for seed in (1, 1, 2))
     lines = [first.line() for _ in range(50)]
     assert [again.line() for _ in range(50)] == lines
@@ -42,11 +42,11 @@ def test_the_same_seed_writes_the_same_lines(fuzzing):
         (b"*OPC?" + b" " * 5000, 0, 1),
     ],
 )
-def test_units_are_counted_by_their_quotes_and_semicolons(fuzzing, line, queries, commands):
+def test_command_units_are_counted_with_quotes_and_semicolons(fuzzing, line, queries, commands):
     assert fuzzing.counted(line) == (queries, commands)
 
 
-SPOILT = {
+BROKEN_ENGINES = {
     "a command that answers": lambda feed, status: lambda data, time: feed(data, time) or b"1\n",
     "a query without reply or error": lambda feed, status: lambda data, time: feed(data, time) and b"",
     "two replies": lambda feed, status: lambda data, time: feed(data, time) * 2,
@@ -65,18 +65,18 @@ SPOILT = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("spoilt", SPOILT)
-def test_a_broken_promise_is_found(fuzzing, fuzzed, spoilt):
+@pytest.mark.parametrize("defect", BROKEN_ENGINES)
+def test_a_broken_promise_is_found(fuzzing, fuzzed, defect):
     fuzzed.hears(b"NOTE 'x'")
     fuzzed.hears(b"BASE:BX?")
     engine = fuzzed.engine
-    engine.feed = SPOILT[spoilt](engine.feed, engine.status)
+    engine.feed = BROKEN_ENGINES[defect](engine.feed, engine.status)
     with pytest.raises(fuzzing.Broken, match="expected"):
         for line in (b"NOTE 'x'", b"BASE:BX?"):
             fuzzed.hears(line)
 
 
-def test_whoever_has_not_logged_in_must_not_be_answered(fuzzing):
+def test_a_reply_before_the_login_is_a_broken_promise(fuzzing):
     instrument = next(fuzzing.instruments(1))
     with fuzzing.reported() as numbers:
         fuzzed = fuzzing.Fuzzed(SharedInstrument(instrument.autograph), numbers, admitted=False)
