@@ -290,7 +290,7 @@ def test_a_picture_upside_down_in_its_carrier_is_found_at_the_fiducials():
     assert document["models"] == []
 
 
-def test_exchanged_prints_are_detected():
+def test_pictures_with_exchanged_names_are_detected_by_their_prints():
     """The pictures themselves have changed names: only the prints can show it."""
     session = open_session(load_scenario("akwanga"), 1)
     drawer = session.autograph._photographs

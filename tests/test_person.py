@@ -358,7 +358,7 @@ def test_the_frequency_of_drawn_slips_equals_their_rates():
     assert written == {"-3.12", "3.21"}
 
 
-def test_random_misreadings_are_in_the_results():
+def test_random_misreadings_are_logged_as_slips():
     session = open_session(one_model(Observer(blunder_rate=0.05)), 1)
     person = session.person
     next(iter(measure_models(person, session.job)))
