@@ -1,4 +1,4 @@
-"""Finished sessions of the tests: made once, handed out unchanged, and copied by tests that change them."""
+"""The gallery of finished sessions: each is made once and returned unchanged."""
 
 import multiprocessing
 import os
@@ -12,8 +12,8 @@ from tests.support.gallery import KINDS, Gallery
 
 
 @pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
-    """The commands that a gallery runs; each writes a file and no session."""
+def gallery_commands(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
+    """Return the commands that a gallery runs; each writes a file and no session."""
     commands: list[tuple[object, ...]] = []
 
     def command(*words: object) -> gallery_module.CommandResult:
@@ -27,14 +27,18 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[tuple[object, ...]]:
     return commands
 
 
-def test_a_session_is_made_once_for_all_callers(tmp_path: Path, made: list[tuple[object, ...]]) -> None:
+def test_a_session_is_made_once_for_all_callers(tmp_path: Path, gallery_commands: list[tuple[object, ...]]) -> None:
     sessions = [Gallery(tmp_path / "gallery").finished("dewitt-pair", seed) for seed in (7, 7, 8)]
-    assert [words[:-1] for words in made] == [(*KINDS["dewitt-pair"].words, "--seed", n, "--out") for n in (7, 8)]
+    assert [words[:-1] for words in gallery_commands] == [
+        (*KINDS["dewitt-pair"].words, "--seed", n, "--out") for n in (7, 8)
+    ]
     assert sessions[0] == sessions[1] != sessions[2]
     assert sessions[0].result.stdout == "printed"
 
 
-def test_another_process_waits_for_a_session_that_is_being_made(tmp_path: Path, made: list[tuple[object, ...]]) -> None:
+def test_another_process_waits_for_a_session_that_is_being_made(
+    tmp_path: Path, gallery_commands: list[tuple[object, ...]]
+) -> None:
     gallery = Gallery(tmp_path / "gallery")
     lock = tmp_path / "gallery" / "dewitt-pair-7.lock"
     lock.write_text(str(os.getpid()))
@@ -45,10 +49,12 @@ def test_another_process_waits_for_a_session_that_is_being_made(tmp_path: Path, 
     lock.unlink()
     waiting.join(10.0)
     assert (waiting.exitcode, lock.exists()) == (0, False)
-    assert gallery.finished("dewitt-pair", 7).folder.is_dir() and made == []
+    assert gallery.finished("dewitt-pair", 7).folder.is_dir() and gallery_commands == []
 
 
-def test_the_lock_of_a_process_that_has_ended_is_removed(tmp_path: Path, made: list[tuple[object, ...]]) -> None:
+def test_the_lock_of_a_process_that_has_ended_is_removed(
+    tmp_path: Path, gallery_commands: list[tuple[object, ...]]
+) -> None:
     ended = multiprocessing.get_context("fork").Process(target=time.time)
     ended.start()
     ended.join()
@@ -57,7 +63,9 @@ def test_the_lock_of_a_process_that_has_ended_is_removed(tmp_path: Path, made: l
     assert gallery.finished("dewitt-pair", 7).folder.is_dir()
 
 
-def test_a_changed_session_is_noticed_and_a_copy_may_change(tmp_path: Path, made: list[tuple[object, ...]]) -> None:
+def test_a_changed_session_is_detected_and_a_copy_may_change(
+    tmp_path: Path, gallery_commands: list[tuple[object, ...]]
+) -> None:
     gallery = Gallery(tmp_path / "gallery")
     session = gallery.finished("dewitt-pair", 7)
     (session.copy_to(tmp_path / "copy") / "results.json").write_text("changed")
@@ -67,8 +75,10 @@ def test_a_changed_session_is_noticed_and_a_copy_may_change(tmp_path: Path, made
         gallery.finished("dewitt-pair", 7)
 
 
-def test_a_session_with_another_exit_code_is_not_kept(tmp_path: Path, made: list[tuple[object, ...]]) -> None:
+def test_a_session_with_another_exit_code_is_not_kept(
+    tmp_path: Path, gallery_commands: list[tuple[object, ...]]
+) -> None:
     for _ in range(2):
         with pytest.raises(AssertionError):
             Gallery(tmp_path / "gallery").finished("novice gives up", 7)
-    assert len(made) == 2
+    assert len(gallery_commands) == 2

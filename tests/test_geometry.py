@@ -86,14 +86,14 @@ def test_angle_between_is_exact_for_small_angles():
     assert angle_between(np.array([1.0, 0.0, 0.0]), np.array([1.0, 1e-9, 0.0])) == pytest.approx(1e-9, rel=1e-9)
 
 
-def test_angles_between_many_vectors_are_those_between_each_two():
+def test_angles_between_many_vectors_equal_the_angle_of_each_pair():
     first, second = np.random.default_rng(2).standard_normal((2, 3, 5))
     each = [angle_between(u, v) for u, v in zip(first.T, second.T, strict=True)]
     np.testing.assert_allclose(angle_between(first, second), each, rtol=1e-14)
 
 
 @pytest.mark.parametrize("height", [4000.0, 6000.0, 9000.0])
-def test_bertrams_refraction_over_the_sea_is_that_of_a_ray_through_the_standard_atmosphere(height):
+def test_bertrams_refraction_over_the_sea_equals_a_ray_through_the_standard_atmosphere(height):
     """A ray bends where the refractive index falls; n - 1 is 2.26e-4 times the density in kg/m3 (ICAO)."""
     z = np.linspace(0.0, height, 2001)
     n = 1.0 + 2.26e-4 * 1.225 * (1.0 - 22.558e-6 * z) ** 4.2559
@@ -102,7 +102,7 @@ def test_bertrams_refraction_over_the_sea_is_that_of_a_ray_through_the_standard_
 
 
 @given(angles, pictures, st.floats(98.0, 215.0), st.floats(-490.0, -140.0))
-def test_a_rays_point_is_imaged_where_the_ray_came_from(each, picture, c, level):
+def test_the_point_of_a_ray_is_imaged_at_the_origin_of_the_ray(each, picture, c, level):
     centre = np.array([5.0, -3.0, 1.0])
     ray = ray_of(picture, rotation(*each), c)
     if ray[2] < -1.0:
@@ -120,7 +120,7 @@ def test_two_rays_of_one_point_meet_in_it_without_parallax(left, right, plan, le
 
 
 @given(pictures, pictures, angles, angles)
-def test_the_mark_stands_where_x_parallax_vanishes(image1, image2, angles1, angles2):
+def test_the_x_parallax_vanishes_at_the_mark(image1, image2, angles1, angles2):
     centre1, centre2 = np.zeros(3), np.array([195.0, -4.0, 3.0])
     small = 0.1
     r1, r2 = rotation(*(small * angles1)), rotation(*(small * angles2))
@@ -151,7 +151,7 @@ def _parallax(elements, image1, image2, x1, x2, level):
 )
 def test_parallax_coefficients_are_the_derivatives_at_any_tilt_and_base(tilt, shifts, base, spot, level):
     elements = np.array([*tilt, *shifts])
-    # With base out the right projector holds the left-hand photograph; the left-hand centre stands at X = 0 in both.
+    # With base out the right projector holds the left-hand photograph; the left-hand centre is at X = 0 in both.
     x1, x2 = (0.0, 195.0) if base == "inside" else (0.0, 160.0)
     image1, image2 = np.array(spot), np.array(spot) * 0.5 - np.array([40.0, 0.0])
     numerical = []
@@ -173,7 +173,7 @@ def test_parallax_coefficients_are_the_derivatives_at_any_tilt_and_base(tilt, sh
 
 
 @given(st.floats(-50.0, 250.0), st.floats(-200.0, 200.0), st.floats(140.0, 490.0), st.floats(50.0, 280.0))
-def test_near_the_vertical_the_coefficients_are_those_of_the_thesis(x, y, z, b):
+def test_near_the_vertical_the_coefficients_equal_the_thesis(x, y, z, b):
     point = np.array([x, y, -z])
     zero = np.zeros(3)
     found = parallax_coefficients(point, point, zero, np.array([b, 0.0, 0.0]), zero, zero)
@@ -192,7 +192,7 @@ def test_a_positive_by_moves_a_centre_towards_minus_y():
     assert _parallax(elements - p * np.eye(10)[by2], image1, image2, 0.0, 195.0, -325.0) == pytest.approx(0.0)
 
 
-def test_one_point_a_model_and_a_batch_are_the_same_call():
+def test_one_call_serves_a_point_a_model_and_a_batch():
     rng = np.random.default_rng(1)
     images = rng.uniform(-90.0, 90.0, (2, 15, 4))
     w, f, k = rng.uniform(-0.05, 0.05, (3, 15, 4))

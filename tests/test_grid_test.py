@@ -1,4 +1,4 @@
-"""What a grid plate must show: a projector's errors, and its perspective centre; at the door, the service sheet."""
+"""Grid test: errors of a projector, its perspective centre, and the service sheet of `a7sim calibrate`."""
 
 import csv
 import json
@@ -58,7 +58,7 @@ FAULTS = {
 
 
 def readings_of(elements, levels=LEVELS, noise=0.0, batch=1, seed=0):
-    """Places ``(2, k, n, batch)`` of the mark at the crosses, seen with an error of noise mm at photo scale."""
+    """Return places ``(2, k, n, batch)`` of the mark at the crosses, with an error of `noise` mm at photo scale."""
     rng = np.random.default_rng(seed)
     centre = np.array([elements["bx"], -elements["by"], elements["bz"]])[:, None, None]
     turned = rotation(*(elements[name] for name in ANGLES))[:, :, None, None]
@@ -88,8 +88,8 @@ def sheets_of(scenario, seed=1, **order):
     return document["projectors"]
 
 
-def sheets_of_crowd(scenario, seeds, **order):
-    """The left and the right projector, each of many sessions, which test as each would at its line (see below)."""
+def sheets_of_batch(scenario, seeds, **order):
+    """Return the sheets of the left and the right projector, each of a batch of sessions."""
     order = GridTestPlan(scenario.camera, scenario.grid_plate, **order)
     workstation = open_batch(scenario, seeds).workstation
     sheets = list(measure_grid_batch(Workstation(workstation.operators, workstation.driver, order.job), order))
@@ -106,7 +106,7 @@ def sheets_of_crowd(scenario, seeds, **order):
     st.floats(100.0, 210.0),
     st.lists(st.floats(-480.0, -150.0), min_size=2, max_size=4, unique=True).filter(lambda z: max(z) - min(z) > 50.0),
 )
-def test_exact_readings_give_the_faults_back(shares, c, levels):
+def test_exact_readings_return_the_faults(shares, c, levels):
     off = dict(zip(UNKNOWNS, np.array(shares) * [0.5, 0.5, 0.5, 0.02, 0.02, 0.02, 1.0, 1.0, 1.0], strict=True))
     real = {name: value + (c if name == "c" else 0.0) for name, value in off.items()}
     found = grid_test(CROSSES, readings_of(real, levels)[..., 0], levels, Elements(c))
@@ -114,12 +114,12 @@ def test_exact_readings_give_the_faults_back(shares, c, levels):
     assert {name: float(error) for name, error in found.errors.items()} == pytest.approx(off, abs=1e-6)
 
 
-def test_a_projector_that_is_as_its_counters_show_is_tested_in_one_round():
+def test_a_projector_that_agrees_with_its_counters_is_tested_in_one_round():
     found = grid_test(CROSSES, readings_of(faultless())[..., 0], LEVELS, Elements(152.68))
     assert found.iterations == 1
 
 
-def test_s0_is_the_pointing_error_put_in_and_the_sigmas_are_the_scatter():
+def test_s0_equals_the_simulated_pointing_error_and_the_sigmas_equal_the_scatter():
     found = grid_test(CROSSES, readings_of(faultless(), noise=0.005, batch=400), LEVELS, Elements(152.68))
     assert np.sqrt((found.s0**2).mean()) == pytest.approx(0.005, rel=0.02)
     for name in UNKNOWNS:
@@ -134,7 +134,7 @@ def test_a_tested_principal_point_and_distance_are_known_to_a_hundredth_or_two()
         assert 2.0 * found.sigmas[name].mean() < 0.02
 
 
-def test_one_level_takes_a_shift_of_the_centre_for_one_of_the_principal_point():
+def test_one_level_confuses_a_shift_of_the_centre_with_a_shift_of_the_principal_point():
     off = faultless() | {"bx": 0.03, "by": -0.02, "bz": 0.04}
     found = grid_test(CROSSES, readings_of(off, [-300.0])[..., 0], [-300.0], Elements(152.68))
     assert set(found.errors) == set(UNKNOWNS) - set(HELD_AT_ONE_LEVEL)
@@ -145,7 +145,7 @@ def test_one_level_takes_a_shift_of_the_centre_for_one_of_the_principal_point():
     assert found.errors["phi"] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_levels_that_lie_close_together_tell_less_apart():
+def test_levels_close_together_separate_the_unknowns_less():
     wide, close = (
         grid_test(CROSSES, readings_of(faultless(), z, noise=0.004, batch=20), z, Elements(152.68))
         for z in (LEVELS, (-300.0, -310.0))
@@ -157,7 +157,7 @@ def test_levels_that_lie_close_together_tell_less_apart():
     assert close.sigmas["kappa"].mean() < 1.5 * wide.sigmas["kappa"].mean()
 
 
-def test_what_is_left_open_is_said():
+def test_undetermined_unknowns_raise_an_error():
     readings = readings_of(faultless())[..., 0]
     with pytest.raises(Undetermined, match="5 crosses or more"):
         grid_test(CROSSES[:, :4], readings[:, :, :4], LEVELS, Elements(152.68))
@@ -167,7 +167,7 @@ def test_what_is_left_open_is_said():
         grid_test(CROSSES[:, :5], readings[:, :, :5], LEVELS, Elements(152.68))
 
 
-def test_the_plates_lie_is_taken_off_and_its_uncertainty_put_on():
+def test_the_placement_of_the_plate_is_subtracted_and_its_uncertainty_added():
     marks = np.array([[-106.0, 106.0, -106.0, 106.0], [-106.0, 106.0, 106.0, -106.0]])
     turn, shift = 3e-4, np.array([0.012, -0.007])
     lain = shift[:, None] + turn * np.array([-marks[1], marks[0]])
@@ -187,7 +187,7 @@ def test_the_plates_lie_is_taken_off_and_its_uncertainty_put_on():
 # --- the plate ----------------------------------------------------------------------------------------
 
 
-def test_a_plate_is_ruled_to_its_accuracy_and_is_the_same_whatever_is_flown():
+def test_a_plate_is_ruled_to_its_accuracy_and_does_not_depend_on_the_flight():
     scenes = [build_scene(load_scenario(name), 5) for name in ("akwanga", "dewitt-pair")]
     plates = [scene.grid_plate for scene in scenes]
     assert (plates[0].points.xy == plates[1].points.xy).all()
@@ -221,13 +221,13 @@ def test_a_plate_is_loaded_over_the_link_like_a_picture():
         ),
     ],
 )
-def test_a_plate_or_levels_that_do_not_fit_are_mistakes(overrides, says):
+def test_an_error_message_names_a_plate_or_levels_that_do_not_fit(overrides, says):
     with pytest.raises(ScenarioError) as caught:
         load_scenario("akwanga", overrides)
     assert says in str(caught.value)
 
 
-def test_crosses_are_taken_evenly():
+def test_crosses_are_selected_evenly():
     plate = GridPlate()
     assert plate.even_counts == [9, 25, 81]
     assert list(plate.some_crosses(9)) == ["G11", "G15", "G19", "G51", "G55", "G59", "G91", "G95", "G99"]
@@ -251,7 +251,7 @@ def test_levels_are_within_reach_and_far_apart(c, levels):
 
 
 def test_without_errors_a_faultless_instrument_has_none():
-    """What is left is the rounding of counters to 0.01, on few different coordinates, and the plate's own 1 um."""
+    """The rest is the rounding of counters to 0.01, on few different coordinates, and the 1 um of the plate."""
     for projector in sheets_of(without_errors(load_scenario("akwanga"))).values():
         assert projector["s0_um"] < 2.5
         assert projector["pointing_um"] < 0.5
@@ -259,7 +259,7 @@ def test_without_errors_a_faultless_instrument_has_none():
             assert abs(each["error"]) < {"gon": 0.002, "mm": 0.01}[each["unit"]], name
 
 
-def test_without_errors_given_faults_are_found_back():
+def test_without_errors_given_faults_are_found():
     for side, projector in sheets_of(without_errors(with_faults())).items():
         put_in = FAULTS[side]
         found = {name: each["error"] for name, each in projector["elements"].items()}
@@ -278,7 +278,7 @@ def test_given_faults_are_found_within_three_sigmas():
     scenario = with_faults()
     shares = [
         (sheet.test.errors[name] - truth * (GON if name in ANGLES else 1.0)) / sheet.test.sigmas[name]
-        for sheet, at_the_line in zip(sheets_of_crowd(scenario, range(8)), sheets_of(scenario).values(), strict=True)
+        for sheet, at_the_line in zip(sheets_of_batch(scenario, range(8)), sheets_of(scenario).values(), strict=True)
         for name, truth in at_the_line["truth"]["errors"].items()
     ]
     assert np.mean(np.abs(shares) <= 3.0) >= 0.97
@@ -287,10 +287,10 @@ def test_given_faults_are_found_within_three_sigmas():
 
 
 @pytest.mark.parametrize("pointings", [1, 4])
-def test_s0_is_that_of_the_mean_of_the_pointings(pointings):
-    """Pointing error over the root of their number, and in it the plate's 1 um and counters read to 0.01."""
+def test_s0_equals_the_standard_deviation_of_the_mean_pointing(pointings):
+    """The pointing error over the root of their number includes the 1 um of the plate and counters read to 0.01."""
     scenario = load_scenario("akwanga", {"observer.monocular_um": "6", "observer.blunder_rate": "0"})
-    sheets = sheets_of_crowd(scenario, range(4), pointings=pointings)
+    sheets = sheets_of_batch(scenario, range(4), pointings=pointings)
     s0 = 1e3 * np.sqrt(np.mean([sheet.test.s0**2 for sheet in sheets]))
     assert s0 == pytest.approx(np.sqrt(36.0 / pointings + 1.0 + 3.0 / pointings), rel=0.08)
     if pointings > 1:
@@ -301,7 +301,7 @@ def test_s0_is_that_of_the_mean_of_the_pointings(pointings):
 
 def test_a_serviced_instrument_gives_four_to_seven_um():
     scenario = load_scenario("grid-test")
-    s0 = 1e3 * np.array([sheet.test.s0 for sheet in sheets_of_crowd(scenario, range(5))])
+    s0 = 1e3 * np.array([sheet.test.s0 for sheet in sheets_of_batch(scenario, range(5))])
     assert 4.0 < s0.min() <= s0.max() < 7.0
 
 
@@ -316,7 +316,7 @@ def test_slips_are_struck_out_and_do_not_spoil_the_test():
         assert abs(off[0]) < 3.0 * sheet.test.sigmas["phi"][0] / GON
 
 
-def test_a_crowd_tests_its_instruments_as_each_would_at_its_line():
+def test_a_batch_tests_its_instruments_as_each_session_does_over_the_link():
     scenario = with_faults()
     order = GridTestPlan(scenario.camera, scenario.grid_plate)
     batch = open_batch(scenario, [1, 2])
@@ -332,8 +332,8 @@ def test_a_crowd_tests_its_instruments_as_each_would_at_its_line():
             assert sheet.finished_at[i] == pytest.approx(alone.finished_at[0])
 
 
-def test_what_carriages_do_is_told_apart_in_the_truth():
-    """A skew of XZ looks like a principal point, scales like another principal distance."""
+def test_effects_of_the_carriages_are_separate_in_the_truth():
+    """A skew of XZ acts like a principal point, scales act like another principal distance."""
     scenario = without_errors(
         load_scenario(
             "akwanga",
@@ -386,7 +386,7 @@ def sessions_by(method):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", list(METHODS))
-def test_centres_are_true_within_three_sigmas_by_every_method(method):
+def test_centres_by_every_method_are_within_three_sigmas_of_the_truth(method):
     shares = [
         difference[name] / centre[f"sigma_{name}"]
         for seed in SEEDS
@@ -400,7 +400,7 @@ def test_centres_are_true_within_three_sigmas_by_every_method(method):
 
 @pytest.mark.slow
 def test_the_three_methods_agree_within_three_sigmas():
-    """Each differs from the truth of its own model, which every session sets up a little otherwise."""
+    """Each differs from the truth of its own model; every session sets up its model slightly differently."""
     shares = []
     for one, other in (("two levels", "levels"), ("levels", "grid plate"), ("two levels", "grid plate")):
         for seed in SEEDS:
@@ -430,7 +430,7 @@ def test_levels_and_plate_are_more_exact_and_take_longer():
 @pytest.mark.parametrize(
     "levels", [(4900.0, 5100.0), (4900.0, 4950.0, 5000.0, 5050.0, 5100.0), tuple(np.linspace(4900.0, 5100.0, 9))]
 )
-def test_more_levels_make_the_centre_more_exact_as_theory_says(levels):
+def test_more_levels_make_the_centre_more_exact_as_in_theory(levels):
     """Height comes from the slopes of the lines, with the variance of a pointing over the squares of the levels."""
     rng = np.random.default_rng(8)
     z0, n, batch, sigma = 7573.0, 6, 3000, 0.008
@@ -446,7 +446,7 @@ def test_more_levels_make_the_centre_more_exact_as_theory_says(levels):
     assert found.sigma_Z0.mean() == pytest.approx(found.Z0.std(), rel=0.12)
 
 
-def test_the_picture_is_put_back_and_centred_again():
+def test_the_picture_is_mounted_and_centred_again_after_the_test():
     session = open_session(read_once(load_scenario("akwanga", {"plan.centre_method": '"grid plate"'})), 1)
     record = next(iter(measure_models(session.person, session.job)))
     elements = {name: session.autograph.element(name) for name in record.orientation.elements}
@@ -470,14 +470,14 @@ def test_a_plate_with_too_few_crosses_in_the_model_does_not_pass():
     assert "too few crosses of plate grid lie within the model" in document["message"]
 
 
-# --- at the door --------------------------------------------------------------------------------------
+# --- the command --------------------------------------------------------------------------------------
 
 
 def a7sim(*arguments):
     return a7sim_in_process(*arguments, cwd=ROOT)
 
 
-def test_calibrate_files_a_sheet(tmp_path):
+def test_calibrate_writes_a_sheet(tmp_path):
     out = tmp_path / "sheet"
     done = a7sim("calibrate", "akwanga", "--points", 25, "--json", "--out", out)
     assert done.returncode == 0, done.stderr
@@ -507,7 +507,7 @@ def test_calibrate_files_a_sheet(tmp_path):
     assert a7sim("calibrate", "akwanga", "--out", out).returncode == 2
 
 
-def test_calibrate_prints_what_a_service_engineer_would_file():
+def test_calibrate_prints_the_sheet_of_a_service_engineer():
     printed = a7sim("calibrate", "akwanga", "--levels", 1, "--points", 9)
     assert printed.returncode == 0, printed.stderr
     words = " ".join(printed.stdout.split())
@@ -522,8 +522,8 @@ def test_calibrate_prints_what_a_service_engineer_would_file():
         assert each in words
 
 
-def test_an_a8_is_tested_too_its_centres_referred_to_the_middle_of_the_base():
-    """It has no counters for by and bz, and they are found all the same; X and Y count 2 mm."""
+def test_the_centres_of_an_a8_refer_to_the_middle_of_the_base():
+    """An A8 has no counters for by and bz, but the test finds them; X and Y count 2 mm."""
     document = json.loads(a7sim("calibrate", "akwanga-a8", "--seed", 4, "--json").stdout)
     assert document["variant"] == "A8"
     for side in ("left", "right"):
@@ -538,7 +538,7 @@ def test_an_a8_is_tested_too_its_centres_referred_to_the_middle_of_the_base():
             assert abs(off) < 4.0 * projector["elements"][name]["sigma"], (side, name)
 
 
-def test_two_tests_of_the_same_seed_are_the_same():
+def test_two_tests_of_the_same_seed_are_equal():
     one, other = (a7sim("calibrate", "grid-test", "--seed", 4, "--json", "--points", 9).stdout for _ in range(2))
     assert one == other
 
@@ -562,7 +562,7 @@ def test_wrong_input_gets_one_sentence_and_exit_code_two(arguments, sentence):
     assert done.stdout == ""
 
 
-def test_an_operator_who_cannot_centre_the_plate_says_so():
+def test_an_operator_that_cannot_centre_the_plate_reports_it():
     done = a7sim("calibrate", "akwanga", "--set", "observer.fiducial_um=900", "--quiet")
     assert done.returncode == 1
     assert "picture grid cannot be centred in projector 1" in done.stderr

@@ -27,7 +27,7 @@ def numbers(reference):
 
 
 def spread_by_parallaxes(names):
-    """Covariance of the corrections that simulated y-parallaxes of weight 1 give, in units of theirs."""
+    """Return the covariance of the corrections from simulated y-parallaxes of weight 1, in units of their variance."""
     parallaxes = PARALLAX_MM * np.random.default_rng(1956).standard_normal((6, SETS))
     one_batch = np.zeros((3, 1))
     left, right = ProjectorPose(one_batch, one_batch), ProjectorPose(np.array([[B], [0.0], [0.0]]), one_batch)
@@ -36,9 +36,9 @@ def spread_by_parallaxes(names):
 
 
 def spread_by_coplanarity(names):
-    """The same from simulated image coordinates of vertical photographs; a y-parallax has the variance of two.
+    """Return the same from simulated image coordinates of vertical photographs; a y-parallax has the variance of two.
 
-    by2 counts there with Y, as a component of the base; a by spindle counts against it.
+    As a component of the base by2 counts with Y; a by spindle counts against it.
     """
     rng = np.random.default_rng(1956)
     images = [
@@ -59,24 +59,24 @@ METHODS = pytest.mark.parametrize("spread", [spread_by_parallaxes, spread_by_cop
 
 
 @METHODS
-def test_dependent_variances_are_hallerts_within_three_per_cent(numbers, spread):
+def test_dependent_variances_equal_hallerts_within_three_per_cent(numbers, spread):
     np.testing.assert_allclose(np.diag(spread(DEPENDENT)), numbers["dependent_by_bz_kappa_phi_omega"], rtol=0.03)
 
 
 @METHODS
-def test_swing_swing_variances_are_hallerts_within_three_per_cent(numbers, spread):
+def test_swing_swing_variances_equal_hallerts_within_three_per_cent(numbers, spread):
     np.testing.assert_allclose(np.diag(spread(SWINGS)), numbers["swing_k1_k2_f1_f2_w1"], rtol=0.03)
 
 
 @METHODS
 @pytest.mark.parametrize("pair", [("by2", "omega2"), ("bz2", "phi2")])
-def test_strong_dependent_covariances_are_hallerts_within_three_per_cent(spread, pair):
+def test_strong_dependent_covariances_equal_hallerts_within_three_per_cent(spread, pair):
     i, j = (DEPENDENT.index(name) for name in pair)
     assert abs(spread(DEPENDENT)[i, j]) == pytest.approx(CLOSED_COVARIANCES[pair], rel=0.03)
 
 
 @METHODS
-def test_swing_and_tilt_are_correlated_as_hallert_says(numbers, spread):
+def test_the_correlation_of_swing_and_tilt_equals_hallerts(numbers, spread):
     covariance = spread(SWINGS)
     correlation = covariance[0, 4] / np.sqrt(covariance[0, 0] * covariance[4, 4])
     assert abs(correlation) == pytest.approx(abs(numbers["swing_correlation_k1_w1"]), rel=0.03)
@@ -84,7 +84,7 @@ def test_swing_and_tilt_are_correlated_as_hallert_says(numbers, spread):
 
 @METHODS
 @pytest.mark.parametrize("names", [DEPENDENT, SWINGS])
-def test_all_covariances_are_the_propagated_ones(spread, names):
+def test_all_covariances_equal_the_propagated_ones(spread, names):
     """Within 3 % of the product of both standard deviations: a weak correlation such as that of by and kappa (0.14)
     is not known better from 20,000 sets, nor is one that is zero."""
     expected, got = propagated(names), spread(names)
@@ -92,6 +92,6 @@ def test_all_covariances_are_the_propagated_ones(spread, names):
     np.testing.assert_allclose(got / np.outer(spreads, spreads), expected / np.outer(spreads, spreads), atol=0.03)
 
 
-def test_the_weak_covariance_of_by_and_kappa_is_hallerts():
+def test_the_weak_covariance_of_by_and_kappa_equals_hallerts():
     i, j = DEPENDENT.index("by2"), DEPENDENT.index("kappa2")
     assert abs(propagated(DEPENDENT)[i, j]) == pytest.approx(CLOSED_COVARIANCES["by2", "kappa2"], rel=1e-9)

@@ -16,7 +16,7 @@ def circle_in(imports: Mapping[str, Iterable[str]]) -> list[str]:
     return []
 
 
-def test_no_module_imports_itself_through_others():
+def test_no_module_imports_itself_through_other_modules():
     graph = grimp.build_graph("a7sim", cache_dir=None)
     imports = {module: graph.find_modules_directly_imported_by(module) for module in graph.modules}
     assert len(imports) > 300
@@ -29,7 +29,7 @@ def test_a_planted_circle_is_found():
 
 
 @pytest.mark.parametrize("module", ["a7sim.console.actions.base", "a7sim.instrument.language.commands.elements"])
-def test_actions_and_handlers_see_an_interface_and_not_the_application(module):
+def test_actions_and_handlers_import_an_interface_and_not_the_application(module):
     graph = grimp.build_graph("a7sim", cache_dir=None)
     imported = graph.find_modules_directly_imported_by(module)
     assert not imported & {"a7sim.console.app", "a7sim.instrument.language.engine"}

@@ -1,4 +1,4 @@
-"""The instrument: what its parts do to rays and view (geometry.md: Counters, Projection centres, Fittings)."""
+"""The instrument: effect of its parts on rays and view (geometry.md: Counters, Projection centres, Fittings)."""
 
 import dataclasses
 
@@ -31,7 +31,7 @@ def photograph(name, points, **changes):
 
 
 def plotter(left=None, right=None, condition=None, polarity="positive"):
-    """An A7 at z = 300 with bx 180, c 150 and one point P on both pictures."""
+    """Return an A7 at z = 300 with bx 180, c 150 and one point P on both pictures."""
     photographs = {
         "L": photograph("L", left or {"P": (30.0, 20.0)}, polarity=polarity),
         "R": photograph("R", right or {"P": (-60.0, 20.0)}, polarity=polarity),
@@ -96,7 +96,7 @@ def test_a_gear_changes_the_counters_step_not_its_reading():
     assert counter.position(5008.0) == pytest.approx(-324.0)
 
 
-def test_everything_an_element_may_be_set_to_lies_in_its_range_and_nothing_moves_beyond():
+def test_an_element_cannot_be_set_beyond_its_range_and_does_not_move():
     a7 = Autograph(A7)
     for name, element in A7.elements.items():
         for value in (element.low - 0.01, element.high + 0.01):
@@ -106,8 +106,8 @@ def test_everything_an_element_may_be_set_to_lies_in_its_range_and_nothing_moves
             assert a7.element(name) == before
 
 
-def test_an_element_that_a_variant_lacks_is_a_conflict_from_its_data():
-    """The seam for the A8: what is refused follows from the variant's table, not from its name."""
+def test_setting_an_element_that_a_variant_lacks_is_a_conflict():
+    """As for the A8: the table of the variant decides which settings are refused, not its name."""
     without_by = dataclasses.replace(
         A7, name="A8", elements={n: e for n, e in A7.elements.items() if not n.startswith("b") or n == "bx"}
     )
@@ -121,7 +121,7 @@ def test_an_element_that_a_variant_lacks_is_a_conflict_from_its_data():
 
 
 @pytest.mark.parametrize("base", ["inside", "outside"])
-def test_the_centres_stand_where_the_base_puts_them(base):
+def test_the_base_defines_the_places_of_the_centres(base):
     a7 = Autograph(A7)
     for name, value in (("bx", 200.0), ("by1", 3.0), ("by2", -4.0), ("bz1", 5.0), ("bz2", -6.0)):
         a7.set_element(name, value)
@@ -133,7 +133,7 @@ def test_the_centres_stand_where_the_base_puts_them(base):
 
 @given(st.floats(-1e6, 1e6), st.floats(-500.0, 500.0), st.floats(0.01, 100.0), st.sampled_from([0, 1, 2]))
 @example(0.0, -0.001, 1.0, 2)
-def test_a_counter_shows_in_digits_what_it_reads_and_never_minus_zero(offset, position, units_per_mm, decimals):
+def test_the_figures_of_a_counter_equal_its_reading_and_are_never_minus_zero(offset, position, units_per_mm, decimals):
     counter = Counter(units_per_mm, decimals, offset)
     assert counter.text(position) == f"{counter.reading(position):.{decimals}f}"
 
@@ -145,7 +145,7 @@ def test_a_counter_shows_in_digits_what_it_reads_and_never_minus_zero(offset, po
     st.floats(-60.0, 60.0),
     st.floats(-60.0, 60.0),
 )
-def test_the_rod_brings_the_mark_to_the_image_of_its_point(omega, phi, kappa, x, y):
+def test_the_rod_moves_the_mark_to_the_image_of_its_point(omega, phi, kappa, x, y):
     a7 = plotter()
     for name, value in (("omega1", omega), ("phi1", phi), ("kappa1", kappa), ("by1", 2.0), ("bz1", -3.0)):
         a7.set_element(name, value)
@@ -156,7 +156,7 @@ def test_the_rod_brings_the_mark_to_the_image_of_its_point(omega, phi, kappa, x,
     np.testing.assert_allclose(at_level(centre, ray, -300.0), [round(x, 2), round(y, 2), -300.0], atol=1e-9)
 
 
-def test_both_images_at_the_mark_mean_that_the_rays_meet_there():
+def test_both_images_are_at_the_mark_where_the_rays_meet():
     a7 = plotter()
     a7.drive("X", 60.0)
     a7.drive("Y", 40.0)
@@ -214,7 +214,7 @@ def test_a_wrong_diapositive_lever_mirrors_it_left_to_right():
     assert seen_off_the_mark(diapositive="right") == pytest.approx((-1000.0, 1000.0))
 
 
-def test_the_triangulation_lever_exchanges_the_eyes_and_turns_the_relief_inside_out():
+def test_the_triangulation_lever_exchanges_the_eyes_and_inverts_the_relief():
     a7 = plotter(left={"P": (31.0, 20.0)})
     a7.drive("X", 60.0)
     a7.drive("Y", 40.0)
@@ -250,7 +250,7 @@ def test_with_base_out_and_its_fittings_the_left_eye_sees_the_left_hand_photogra
     assert a7.stereo("P") == pytest.approx((0.0, 0.0), abs=1e-6)
 
 
-def test_a_drum_turned_by_hand_stops_between_two_counts_and_the_counter_rounds():
+def test_a_drum_turned_by_hand_stops_between_two_counts_and_its_counter_rounds():
     """geometry.md: a spindle has a continuous position; only a setting through the counter lands on a count."""
     a7 = plotter()
     a7.drive("X", 60.0)
@@ -286,7 +286,7 @@ def test_a_swing_is_turned_through_its_zero_and_a_tilt_not_beyond_its_end():
     assert a7.element("phi1") == 100.0
 
 
-def test_a_swung_picture_is_seen_swung():
+def test_a_swung_picture_appears_swung():
     a7 = plotter()
     a7.set_element("kappa1", 100.0)
     centre = a7.carrier(1)
@@ -315,7 +315,7 @@ def test_faults_shift_the_view_and_not_the_counters():
     assert worn.eyepiece(2, "P") == faultless.eyepiece(2, "P")
 
 
-def test_axes_that_miss_the_centre_move_it_when_the_camera_tilts():
+def test_eccentric_axes_move_the_centre_when_the_camera_tilts():
     condition = Condition(left=ProjectorCondition(axes_um=(0.0, 0.0, 5.0)))
     a7 = plotter(condition=condition)
     assert a7.pose(1)[0] == pytest.approx([0.0, 0.0, 0.0])
@@ -323,7 +323,7 @@ def test_axes_that_miss_the_centre_move_it_when_the_camera_tilts():
     assert a7.pose(1)[0][0] == pytest.approx(0.005 * np.sin(5.0 * GON))
 
 
-def test_readings_at_undoes_the_guides():
+def test_readings_at_is_the_inverse_of_the_guides():
     condition = Condition(carriage_scale_ppm=(100.0, -50.0, 30.0), carriage_skew_ppm=(20.0, 10.0, -15.0))
     a7 = Autograph(A7, condition)
     a7.drive("X", 120.0)
@@ -335,7 +335,7 @@ def test_readings_at_undoes_the_guides():
 # --- pictures ------------------------------------------------------------------------------------------
 
 
-def test_the_eyepiece_picture_shows_the_signal_where_the_eyepiece_reads_it():
+def test_the_eyepiece_picture_shows_the_signal_at_the_place_that_the_eyepiece_reads():
     scene = build_scene(load_scenario("akwanga"), 1)
     with_picture = build_autograph(load_scenario("akwanga").instrument, scene.photographs, 1)
     with_picture.load(1, "101")
@@ -355,7 +355,7 @@ def test_the_eyepiece_picture_shows_the_signal_where_the_eyepiece_reads_it():
 
 
 def test_both_photographs_show_the_same_ground():
-    """The picture is evaluated where a place's ray meets the ground, so both agree in true perspective."""
+    """A picture is evaluated at the intersection of each ray with the ground, so both agree in true perspective."""
     scenario = load_scenario("akwanga", {"film.irregular_um": "0", "film.identification_um": "0"})
     scene = build_scene(scenario, 1)
     for name in ("K1", "1021", "C3"):
@@ -375,13 +375,13 @@ def test_a_picture_upside_down_has_its_fiducials_far_from_their_marks():
     assert min(np.hypot(dx, dy) for _, dx, dy in a7.carrier(1).fiducial_displacements()) > 200.0
 
 
-def test_the_same_photograph_does_not_lie_in_two_projectors():
+def test_the_same_photograph_cannot_be_in_two_projectors():
     a7 = plotter()
     with pytest.raises(SettingsConflictError):
         a7.load(2, "L")
 
 
-def test_every_variant_is_whole():
+def test_every_variant_is_complete():
     for variant in VARIANTS.values():
         for element in variant.elements.values():
             assert element.low <= element.zero <= element.high
@@ -393,7 +393,7 @@ def test_every_variant_is_whole():
 
 
 @given(st.floats(0.3, 9.0), st.floats(-9000.0, 9000.0), st.sampled_from("XYZ"), st.integers(0, 1))
-def test_a_carriage_can_be_driven_to_what_its_counter_shows_at_its_ends(units, preset, axis, end):
+def test_a_carriage_can_be_driven_to_the_readings_of_its_ends(units, preset, axis, end):
     a7 = Autograph(A7)
     a7.drive("Z", -490.0)
     a7.set_height_gear(units)
@@ -402,7 +402,7 @@ def test_a_carriage_can_be_driven_to_what_its_counter_shows_at_its_ends(units, p
     assert a7.counter(axis) == a7.counter_limits(axis)[end]
 
 
-def test_rods_that_a_reset_left_too_steep_can_be_brought_back_but_not_taken_further():
+def test_rods_that_a_reset_left_too_steep_can_move_back_but_not_further():
     a7 = Autograph(A7)
     for name, value in (("bz1", 27.0), ("bz2", 27.0), ("by1", 50.0), ("by2", 50.0)):
         a7.set_element(name, value)
@@ -416,7 +416,7 @@ def test_rods_that_a_reset_left_too_steep_can_be_brought_back_but_not_taken_furt
     a7.turn_handwheel("X", 1.0)
 
 
-def test_a_registration_is_struck_once_and_keeps_its_reason():
+def test_a_registration_is_struck_out_once_and_keeps_its_reason():
     a7 = Autograph(A7)
     a7.recorder.register("1", [("X", "0.00")])
     a7.recorder.strike(1, "wrong point")

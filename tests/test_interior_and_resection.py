@@ -33,7 +33,7 @@ SEEDS = st.integers(0, 100_000)
 
 
 def drawn_matrix(kind, rng):
-    """What takes calibrated places to measured ones: turned by up to the full circle and scaled like any comparator."""
+    """Return a matrix from calibrated to measured places, turned by up to a full circle and scaled."""
     angle, scale = rng.uniform(-np.pi, np.pi), 10.0 ** rng.uniform(-2.0, 2.0)
     matrix, film = np.eye(3), np.eye(3)
     matrix[:2, :2] = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
@@ -53,8 +53,8 @@ def carried(matrix, points):
 # Interior orientation
 
 
-def test_noobeeds_affine_comes_out_to_its_last_digit(reference):
-    """Reference 12; its fit takes columns and rows to mm."""
+def test_noobeeds_affine_is_computed_to_its_last_digit(reference):
+    """Reference 12; its fit transforms columns and rows to mm."""
     data = tomllib.loads((reference / "12_noobeed_interior.toml").read_text(encoding="utf-8"))
     rows = data["fiducials"]
     measured = np.array([(f["col"], f["row"]) for f in rows]).T
@@ -69,7 +69,7 @@ def test_noobeeds_affine_comes_out_to_its_last_digit(reference):
 
 
 @pytest.mark.parametrize("photo", ["27", "28"])
-def test_a_real_pairs_fiducials_come_to_their_certificate(reference, photo):
+def test_the_fiducials_of_a_real_pair_fit_their_certificate(reference, photo):
     """Reference 02: counts of some 11.9 um, read to a quarter; film, comparator and certificate leave 5 um.
 
     From this fit and the source's own corrections the x of its eight refined points follow to 1e-12 mm on both.
@@ -91,7 +91,7 @@ def test_a_real_pairs_fiducials_come_to_their_certificate(reference, photo):
 
 
 @given(SEEDS, st.sampled_from(KINDS))
-def test_any_fit_comes_back_from_its_fiducials(seed, kind):
+def test_any_fit_is_recovered_from_its_fiducials(seed, kind):
     rng = np.random.default_rng(seed)
     matrix = drawn_matrix(kind, rng)
     fit = plane_fit(carried(matrix, EIGHT), EIGHT, kind)
@@ -102,7 +102,7 @@ def test_any_fit_comes_back_from_its_fiducials(seed, kind):
 
 
 @given(SEEDS, st.sampled_from(KINDS))
-def test_a_batch_of_fits_is_its_members_and_order_does_not_matter(seed, kind):
+def test_a_batch_of_fits_equals_its_members_and_order_does_not_matter(seed, kind):
     rng = np.random.default_rng(seed)
     n = MIN_FIDUCIALS[kind] + 3
     measured = EIGHT[:, :n, None] * 1.001 + 3.0 + 0.02 * rng.standard_normal((2, n, 5))
@@ -120,7 +120,7 @@ def test_a_batch_of_fits_is_its_members_and_order_does_not_matter(seed, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_fits_standard_deviations_are_the_scatter_of_simulated_fiducials(kind):
+def test_the_standard_deviations_of_a_fit_equal_the_scatter_of_simulated_fiducials(kind):
     rng = np.random.default_rng(4)
     calibrated = EIGHT[:, :, None] + 0.005 * rng.standard_normal((2, 8, 6000))
     fit = plane_fit(np.broadcast_to(83.0 * EIGHT[:, :, None] + 9000.0, calibrated.shape), calibrated, kind)
@@ -130,23 +130,25 @@ def test_the_fits_standard_deviations_are_the_scatter_of_simulated_fiducials(kin
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_film_shrinkage_goes_into_the_principal_distance(kind):
+def test_film_shrinkage_changes_the_principal_distance(kind):
     shrunk = EIGHT * (1.0 - 400e-6) + np.array([[0.7], [-0.3]])
     assert float(principal_distance_for_film(152.676, plane_fit(shrunk, EIGHT, kind))) == pytest.approx(
         152.676 * (1.0 - 400e-6), abs=1e-9
     )
 
 
-def test_unequal_shrinkage_goes_in_by_its_mean():
+def test_unequal_shrinkage_changes_the_principal_distance_by_its_mean():
     shrunk = EIGHT * np.array([[1.0 - 500e-6], [1.0 - 300e-6]])
     assert float(plane_fit(shrunk, EIGHT, "affine").film_scale) == pytest.approx(1.0 - 400e-6, abs=1e-8)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_too_few_fiducials_are_named(kind):
-    fewest = MIN_FIDUCIALS[kind]
-    with pytest.raises(Undetermined, match=rf"expected {fewest} fiducials or more .* {kind}, got {fewest - 1}"):
-        plane_fit(EIGHT[:, : fewest - 1], EIGHT[:, : fewest - 1], kind)
+def test_the_error_message_names_too_few_fiducials(kind):
+    min_fiducials = MIN_FIDUCIALS[kind]
+    with pytest.raises(
+        Undetermined, match=rf"expected {min_fiducials} fiducials or more .* {kind}, got {min_fiducials - 1}"
+    ):
+        plane_fit(EIGHT[:, : min_fiducials - 1], EIGHT[:, : min_fiducials - 1], kind)
 
 
 @pytest.mark.parametrize("kind", ["affine", "projective"])
@@ -164,7 +166,7 @@ def test_three_of_four_fiducials_on_a_line_give_no_projective_fit():
         plane_fit(four, four, "projective")
 
 
-def test_a_kind_that_is_none_is_named():
+def test_the_error_message_names_an_unknown_kind():
     with pytest.raises(ValueError, match="conformal, affine, projective, got 'bilinear'"):
         plane_fit(EIGHT, EIGHT, "bilinear")
 
@@ -187,8 +189,8 @@ def ground_under(rng, n, tilt, relief=0.0):
 
 
 @given(SEEDS)
-def test_the_corrections_undo_lens_air_and_curvature(seed):
-    """Everything that the scene does on the way to the film, taken off to below 0.1 um, at any tilt to 5 degrees."""
+def test_the_corrections_remove_lens_air_and_curvature(seed):
+    """The corrections remove the effects of the scene on the film to below 0.1 um, at any tilt to 5 degrees."""
     rng = np.random.default_rng(seed)
     lens = camera([3e-8, -2e-12], (0.012, -0.018))
     ground, centre, turn = ground_under(rng, 30, 0.09, relief=200.0)
@@ -202,7 +204,7 @@ def test_the_corrections_undo_lens_air_and_curvature(seed):
     np.testing.assert_allclose(without_curvature(back, C, centre[2], ground[2], turn), exact, rtol=0.0, atol=1e-9)
 
 
-def test_all_corrections_in_one_call_are_the_single_ones():
+def test_all_corrections_in_one_call_equal_the_single_corrections():
     rng = np.random.default_rng(6)
     lens = camera([3e-8], (0.02, 0.01))
     ground, centre, turn = ground_under(rng, 25, 0.05)
@@ -225,21 +227,21 @@ def test_all_corrections_in_one_call_are_the_single_ones():
         corrected_image(filmed, C, curvature=True)
 
 
-def test_curvature_of_a_vertical_is_the_textbooks():
+def test_the_curvature_correction_of_a_vertical_equals_the_textbook():
     """H r^3 / (2 R c^2): some 17 um at r = 100 mm, c = 152 mm, H = 5 km, outward."""
     image = np.array([[100.0, 0.0], [0.0, -60.0]])
     radial = length_of(without_curvature(image, C, 5000.0)) - length_of(image)
     np.testing.assert_allclose(radial, 5000.0 * np.array([100.0, 60.0]) ** 3 / (2 * 6.37e6 * C**2), rtol=2e-3)
 
 
-def test_the_principal_point_stays_where_it_is():
+def test_the_principal_point_does_not_move():
     still = np.zeros((2, 1))
     assert (without_distortion(still, [1e-8, 1e-13]) == 0.0).all()
     assert (without_refraction(still, C, 3000.0) == 0.0).all()
     assert (without_curvature(still, C, 3000.0) == 0.0).all()
 
 
-def test_an_image_beyond_the_lenses_reach_is_named():
+def test_the_error_message_names_an_image_beyond_the_range_of_the_lens():
     with pytest.raises(Undetermined, match=r"radius .* got one at 150\.0 mm"):
         without_distortion(np.array([[150.0], [0.0]]), [-2e-5])
 
@@ -248,7 +250,7 @@ def test_an_image_beyond_the_lenses_reach_is_named():
 
 
 def photographs(rng, n, tilt=0.3, count=None):
-    """Ground points, their images and the cameras: centre, rotation."""
+    """Return ground points, their images and the cameras: centre, rotation."""
     batch = () if count is None else (count,)
     shape = (3, 1, *(1,) * len(batch))
     ground = rng.uniform(-1.0, 1.0, (3, n, *batch)) * np.array([800.0, 800.0, 80.0]).reshape(shape)
@@ -260,8 +262,8 @@ def photographs(rng, n, tilt=0.3, count=None):
     return ground, image_of(ground, centre[:, None], turn[:, :, None], C), centre, turn
 
 
-def test_dewitts_resection_comes_out_to_its_digits(reference):
-    """Reference 03. Its program divides the squares by 2n, not by 2n - 6: s0 and sigmas are the smaller by that."""
+def test_dewitts_resection_is_computed_to_its_digits(reference):
+    """Reference 03. Its program divides the squares by 2n, not by 2n - 6: this makes s0 and sigmas smaller."""
     data = tomllib.loads((reference / "03_dewitt_public_domain.toml").read_text(encoding="utf-8"))["resection"]
     image = np.array([(p["x"], p["y"]) for p in data["points"]]).T
     ground = np.array([(p["X"], p["Y"], p["Z"]) for p in data["points"]]).T
@@ -278,7 +280,7 @@ def test_dewitts_resection_comes_out_to_its_digits(reference):
 
 
 def condition_at(ground, centre, turn):
-    """Condition number of a resection's equations at a camera, in the unit and about the mean of its points."""
+    """Return the condition number of a resection at a camera, in the unit and about the mean of its points."""
     mean = ground.mean(axis=1)
     unit = np.sqrt(((ground - mean[:, None]) ** 2).sum(axis=0).mean())
     away = (ground - centre[:, None]) / unit
@@ -288,7 +290,7 @@ def condition_at(ground, centre, turn):
 
 @given(SEEDS, st.integers(4, 12), st.floats(0.0, 0.8))
 @example(42895, 4, 0.59375)
-def test_any_camera_comes_back_from_four_points_or_more_unless_it_is_by_their_danger_cylinder(seed, n, tilt):
+def test_a_camera_is_recovered_from_four_or_more_points_unless_near_their_danger_cylinder(seed, n, tilt):
     ground, image, centre, turn = photographs(np.random.default_rng(seed), n, tilt)
     if condition_at(ground, centre, turn) >= MAX_CONDITION:
         with pytest.raises(Undetermined, match="danger cylinder"):
@@ -296,7 +298,7 @@ def test_any_camera_comes_back_from_four_points_or_more_unless_it_is_by_their_da
         return
     found = resection(image, ground, C)
     if n == 4 and np.abs(found.centre - centre).max() > 1.0:
-        assert float(found.s0) < 1e-6  # four points can have two cameras alike, to the rounding of the images
+        assert float(found.s0) < 1e-6  # four points can fit two cameras, to the rounding of the images
         return
     weak = max(1.0, float(found.adjustment.condition) / 1e4)
     np.testing.assert_allclose(found.centre, centre, rtol=0.0, atol=1e-6 * weak)
@@ -304,7 +306,7 @@ def test_any_camera_comes_back_from_four_points_or_more_unless_it_is_by_their_da
 
 
 def test_three_points_are_seldom_refused():
-    """Refused are three points that two cameras near the same place could have seen: some four in a hundred."""
+    """Three points are refused if two cameras near the same place could image them: some four in a hundred."""
     refused = 0
     for seed in range(300):
         ground, image, *_ = photographs(np.random.default_rng(seed), 3)
@@ -316,7 +318,7 @@ def test_three_points_are_seldom_refused():
 
 
 @given(SEEDS)
-def test_three_points_give_a_camera_that_images_them_and_none_is_nearer_the_vertical(seed):
+def test_three_points_give_the_camera_nearest_the_vertical_that_images_the_points(seed):
     ground, image, _, turn = photographs(np.random.default_rng(seed), 3)
     try:
         found = resection(image, ground, C)
@@ -329,7 +331,7 @@ def test_three_points_give_a_camera_that_images_them_and_none_is_nearer_the_vert
 
 @examples(30)
 @given(SEEDS)
-def test_a_batch_of_resections_is_its_members_and_order_does_not_matter(seed):
+def test_a_batch_of_resections_equals_its_members_and_order_does_not_matter(seed):
     rng = np.random.default_rng(seed)
     n = 7
     ground, image, _, _ = photographs(rng, n, count=4)
@@ -345,7 +347,7 @@ def test_a_batch_of_resections_is_its_members_and_order_does_not_matter(seed):
     np.testing.assert_allclose(together.adjustment.redundancy_numbers.sum(axis=0), 2 * n - 6, rtol=1e-6)
 
 
-def test_the_resections_standard_deviations_are_the_scatter_of_simulated_images():
+def test_the_standard_deviations_of_a_resection_equal_the_scatter_of_simulated_images():
     rng = np.random.default_rng(8)
     ground, image, centre, turn = photographs(rng, 9)
     noisy = image[:, :, None] + 0.005 * rng.standard_normal((2, 9, 4000))
@@ -359,8 +361,8 @@ def test_the_resections_standard_deviations_are_the_scatter_of_simulated_images(
 
 
 @pytest.mark.parametrize("shape", ["square", "three corners of a square", "equal sides"])
-def test_a_vertical_photograph_of_a_symmetric_figure_resects(shape):
-    """There Grunert's own expression for the second distance is 0/0."""
+def test_a_vertical_photograph_of_a_symmetric_figure_is_resected(shape):
+    """In this case Grunert's own expression for the second distance is 0/0."""
     square = 500.0 * np.array([(-1, -1, 0), (-1, 1, 0), (1, -1, 0), (1, 1, 0)], dtype=float).T
     equal = 500.0 * np.array([(0.0, 1.0, 0.0), (0.75**0.5, -0.5, 0.0), (-(0.75**0.5), -0.5, 0.0)]).T
     points = {"square": square, "three corners of a square": square[:, :3], "equal sides": equal}[shape]
@@ -369,7 +371,7 @@ def test_a_vertical_photograph_of_a_symmetric_figure_resects(shape):
     np.testing.assert_allclose(found.centre, centre, rtol=0.0, atol=1e-6)
 
 
-def test_two_points_and_points_on_a_line_do_not_resect():
+def test_two_points_and_points_on_a_line_give_no_resection():
     line = np.array([(1.0, 2.0, 0.1)]).T * np.arange(5.0) + np.array([[5e5], [2e5], [100.0]])
     centre = np.array([5e5, 2e5, 130.0])
     image = image_of(line, centre[:, None], np.eye(3), C)
@@ -384,7 +386,7 @@ def test_two_points_and_points_on_a_line_do_not_resect():
 
 @pytest.mark.parametrize("decimals", [3, 12])
 @pytest.mark.parametrize("turn", [np.eye(3), rotation(0.1, -0.05, 1.0)])
-def test_a_centre_on_the_danger_cylinder_is_not_resected_into_nonsense(decimals, turn):
+def test_a_centre_on_the_danger_cylinder_gives_no_wrong_resection(decimals, turn):
     around = np.array([0.0, 2.5, 5.0])
     points = np.array([500.0 * np.cos(around), 500.0 * np.sin(around), np.zeros(3)])
     centre = np.array([500.0 * np.cos(5.7), 500.0 * np.sin(5.7), 1000.0])
@@ -407,7 +409,7 @@ def pointings_at(levels, noise=0.0, rng=None, count=None):
     return exact if rng is None else exact + noise * rng.standard_normal(exact.shape)
 
 
-def test_two_levels_are_the_theses_two_levels():
+def test_two_levels_give_the_computation_of_the_thesis():
     pointings = pointings_at((4900.0, 5100.0), 0.008, np.random.default_rng(1))
     two = perspective_centre(pointings[:, 0], pointings[:, 1], 4900.0, 5100.0)
     many = perspective_centre_of_levels(pointings, (4900.0, 5100.0))
@@ -425,25 +427,25 @@ def test_the_order_of_levels_and_of_points_does_not_matter(levels, order):
     assert float(found.pointing_rms) < 1e-9
 
 
-def test_more_levels_are_tighter_by_the_theory():
-    """A line carried on to Z0 strays by sigma sqrt(1/k + (Z0 - mean)^2 / sum of (Z - mean)^2); so do the centres."""
-    strayings, spreads, estimates = [], [], []
+def test_more_levels_reduce_the_standard_deviations_as_in_theory():
+    """A line extended to Z0 has sigma sqrt(1/k + (Z0 - mean)^2 / sum of (Z - mean)^2); so do the centres."""
+    deviations, spreads, estimates = [], [], []
     for levels in ((4900.0, 5100.0), (4900.0, 4950.0, 5000.0, 5050.0, 5100.0), (4900.0, 4900.0, 5100.0, 5100.0)):
         z = np.array(levels)
-        strayings.append(np.sqrt(1.0 / z.size + (CENTRE[2] - z.mean()) ** 2 / ((z - z.mean()) ** 2).sum()))
+        deviations.append(np.sqrt(1.0 / z.size + (CENTRE[2] - z.mean()) ** 2 / ((z - z.mean()) ** 2).sum()))
         found = perspective_centre_of_levels(pointings_at(levels, 0.008, np.random.default_rng(3), 6000), levels)
         spreads.append([getattr(found, name).std() for name in ("X0", "Y0", "Z0", "T0")])
         estimates.append([np.sqrt((getattr(found, f"sigma_{name}") ** 2).mean()) for name in ("X0", "Y0", "Z0", "T0")])
         if z.size > 2:
             assert np.sqrt((found.pointing_rms**2).mean()) == pytest.approx(0.008, rel=0.02)
     np.testing.assert_allclose(estimates, spreads, rtol=0.05)
-    for straying, spread in zip(strayings, spreads, strict=True):
-        np.testing.assert_allclose(np.array(spread) / spreads[0], straying / strayings[0], rtol=0.05)
-    assert strayings[1] < 0.95 * strayings[0]
-    assert strayings[2] == pytest.approx(strayings[0] / np.sqrt(2.0))
+    for straying, spread in zip(deviations, spreads, strict=True):
+        np.testing.assert_allclose(np.array(spread) / spreads[0], straying / deviations[0], rtol=0.05)
+    assert deviations[1] < 0.95 * deviations[0]
+    assert deviations[2] == pytest.approx(deviations[0] / np.sqrt(2.0))
 
 
-def test_a_batch_of_centres_is_its_members():
+def test_a_batch_of_centres_equals_its_members():
     levels = (4900.0, 5000.0, 5100.0)
     pointings = pointings_at(levels, 0.01, np.random.default_rng(5), 4)
     together = perspective_centre_of_levels(pointings, levels)
@@ -474,7 +476,7 @@ def read_through(turn, centre, level, noise=0.0, rng=None):
 
 
 @given(SEEDS, st.booleans())
-def test_a_grid_plates_centre_and_tilts_come_back(seed, two_heights):
+def test_centre_and_tilts_are_recovered_from_a_grid_plate(seed, two_heights):
     rng = np.random.default_rng(seed)
     turn = rotation(*rng.uniform(-0.05, 0.05, 3))
     centre = np.array([4999.3, 4992.5, 320.0]) + rng.uniform(-5.0, 5.0, 3)
@@ -492,8 +494,8 @@ def test_a_grid_plate_shows_the_pointing_error_at_its_own_scale():
         assert np.sqrt((found.sigma_centre[axis] ** 2).mean()) == pytest.approx(found.centre[axis].std(), rel=0.06)
 
 
-def test_the_a8s_centres_stand_at_a_quarter_of_the_base_about_200():
-    """P 3.1 and 3.2: a point read there has x = 2 (Xr - 200 + B/4) and Z below the base Zin - dr, both zero."""
+def test_the_centres_of_an_a8_are_a_quarter_of_the_base_from_200():
+    """P 3.1 and 3.2: a point read at this place has x = 2 (Xr - 200 + B/4) and Z below the base Zin - dr, both zero."""
     left, right = a8_centres(160.0, 300.0, 12.5)
     np.testing.assert_allclose(left, (160.0, 200.0, 312.5))
     np.testing.assert_allclose(right, (240.0, 200.0, 312.5))
@@ -508,7 +510,7 @@ def test_a_published_a8_setting_agrees_with_ps_rule():
     assert (left[0] + right[0]) / 2.0 == 200.0
 
 
-def test_a8_centres_of_many_bases_are_those_of_each():
+def test_a8_centres_of_many_bases_equal_the_centres_of_each_base():
     bases = np.array([100.0, 160.0, 210.0])
     left, right = a8_centres(bases, 300.0)
     assert left.shape == right.shape == (3, 3)

@@ -1,4 +1,4 @@
-"""Nothing observed is lost (issue 6): what a journal holds, what damage is found, how a session goes on, replay."""
+"""Journals lose no observation (issue 6): contents, detection of damage, resuming and replay."""
 
 import errno
 import json
@@ -44,13 +44,13 @@ def files_of(folder):
 
 @pytest.fixture(scope="module")
 def whole(finished):
-    """The folder of an uninterrupted session of the operator, seed 7."""
+    """Return the folder of an uninterrupted session of the operator, seed 7."""
     return finished("dewitt-pair", 7).folder
 
 
 @pytest.fixture
 def copied(whole, tmp_path):
-    """A copy of it to be damaged."""
+    """Return a copy of the session that a test may damage."""
     return Path(shutil.copytree(whole, tmp_path / "copy"))
 
 
@@ -60,7 +60,7 @@ def resumed(folder):
 
 
 def forged(journalled, header=None, change=lambda number, data: data):
-    """Return the lines of a journal with checksums that fit, though somebody changed them."""
+    """Return the changed lines of a journal with checksums that fit."""
     chain = ChecksumChain()
     lines = []
     for number, line in enumerate(journalled.lines, start=1):
@@ -71,10 +71,10 @@ def forged(journalled, header=None, change=lambda number, data: data):
     return b"".join(lines)
 
 
-# --- what it holds ----------------------------------------------------------------------------------------
+# --- contents ----------------------------------------------------------------------------------------
 
 
-def test_the_header_says_what_a_session_follows_from_and_names_the_scenario_by_its_hash(whole):
+def test_the_header_has_all_inputs_of_a_session_and_the_hash_of_the_scenario(whole):
     header = read_journal(whole / "session.jsonl").header
     assert header["software"] == f"a7sim {__version__}"
     assert (header["command"], header["seed"], header["variant"], header["pictures"]) == ("run", 7, "A7", PICTURES)
@@ -86,20 +86,20 @@ def test_the_header_says_what_a_session_follows_from_and_names_the_scenario_by_i
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "scenarios").glob("*.toml")))
-def test_every_scenario_can_be_carried(name):
+def test_a_journal_can_contain_every_scenario(name):
     carried_about = json.loads(json.dumps(to_data(load_scenario(name))))
     assert json.loads(json.dumps(to_data(from_data(carried_about)))) == carried_about
     assert find_scenario(name).is_file()
 
 
-def test_it_holds_the_book_too(whole):
+def test_a_journal_contains_the_book(whole):
     lines = [json.loads(line) for line in (whole / "session.jsonl").read_text().splitlines()[1:]]
     entries = [line for line in lines if line.get("kind") == "entry"]
     rows = (whole / "book.csv").read_text().splitlines()[1:]
     assert [f"{line['number']},{line['t']:.1f}" for line in entries] == [",".join(row.split(",")[:2]) for row in rows]
 
 
-def test_the_truth_stands_in_a_file_of_its_own(whole):
+def test_the_truth_is_in_a_separate_file(whole):
     checkpoints = list(read_checkpoints(whole / "session.states.jsonl"))
     journalled = read_journal(whole / "session.jsonl")
     assert len(checkpoints) >= 2
@@ -150,7 +150,7 @@ def test_a_journal_cut_at_any_of_its_last_300_bytes_is_read_to_its_last_whole_li
 
 
 @pytest.mark.parametrize("flipped", [0x0B, ord("}")])
-def test_a_flipped_last_line_end_is_no_torn_line(whole, tmp_path, flipped):
+def test_a_flipped_last_line_end_is_not_read_as_a_torn_line(whole, tmp_path, flipped):
     data = bytearray((whole / "session.jsonl").read_bytes())
     data[-1] = flipped
     (tmp_path / "session.jsonl").write_bytes(data)
@@ -171,7 +171,7 @@ def test_a_flipped_last_line_end_is_no_torn_line(whole, tmp_path, flipped):
         (b"\xff\xfe\n\n", "line 1: expected the checksum"),
     ],
 )
-def test_what_is_no_journal_gets_one_sentence(tmp_path, content, sentence, capsys):
+def test_a_file_that_is_no_journal_gets_an_error_message_of_one_sentence(tmp_path, content, sentence, capsys):
     (tmp_path / "session.jsonl").write_bytes(content)
     for arguments in (("run", "--resume", tmp_path), ("replay", tmp_path)):
         done = a7sim_captured(capsys, *arguments)
@@ -180,11 +180,11 @@ def test_what_is_no_journal_gets_one_sentence(tmp_path, content, sentence, capsy
         assert done.stderr.count("\n") == 1
 
 
-# --- going on ---------------------------------------------------------------------------------------------
+# --- resuming ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("share", [0.0, 0.37, 0.9, 1.0])
-def test_a_run_that_was_cut_off_leaves_what_an_uninterrupted_one_leaves(whole, tmp_path, share):
+def test_a_resumed_run_writes_the_files_of_an_uninterrupted_run(whole, tmp_path, share):
     data = (whole / "session.jsonl").read_bytes()
     header = data.index(b"\n") + 1
     cut = data[: header + int(share * (len(data) - header))]
@@ -196,8 +196,8 @@ def test_a_run_that_was_cut_off_leaves_what_an_uninterrupted_one_leaves(whole, t
     assert files_of(tmp_path) == expected
 
 
-def test_a_run_that_is_killed_goes_on_to_the_same_bytes(whole, tmp_path, capsys):
-    """SIGKILL where the journal has come to a third and to two thirds of its length; benchmarks/killed.py has more."""
+def test_a_killed_run_resumes_to_the_same_bytes(whole, tmp_path, capsys):
+    """SIGKILL after a third and after two thirds of the length of the journal; benchmarks/killed.py has more."""
     size = (whole / "session.jsonl").stat().st_size
     journal = tmp_path / "out" / "session.jsonl"
     command = ["run", "dewitt-pair", "--seed", "7", *SETTINGS, "--quiet", "--out", str(tmp_path / "out")]
@@ -247,7 +247,7 @@ def test_a_journal_of_something_else_is_refused_at_line_1(copied, key, value, se
         ('{"photos": []}', "expected a scenario of this version of a7sim"),
     ],
 )
-def test_a_scenario_that_is_none_is_said_and_another_may_be_named(copied, content, sentence, capsys):
+def test_the_error_message_names_an_invalid_scenario_and_another_may_be_given(copied, content, sentence, capsys):
     file = copied / "session.scenario.json"
     file.unlink() if content is None else file.write_text(content)
     done = a7sim_captured(capsys, "replay", copied, "--quiet")
@@ -257,7 +257,7 @@ def test_a_scenario_that_is_none_is_said_and_another_may_be_named(copied, conten
     assert "expected the scenario and the measurements that" in a7sim_captured(capsys, *named, "akwanga").stderr
 
 
-def test_a_journal_without_its_scenario_replays_with_one_that_is_named(tmp_path, capsys):
+def test_a_journal_without_its_scenario_replays_with_a_given_scenario(tmp_path, capsys):
     assert a7sim_captured(capsys, "replay", "interior", "--out", tmp_path / "out", "--quiet").returncode == 0
     script = read_script(find_script("interior"))
     (tmp_path / "out" / "session.scenario.json").unlink()
@@ -268,7 +268,7 @@ def test_a_journal_without_its_scenario_replays_with_one_that_is_named(tmp_path,
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_a_line_left_over_is_named(copied):
+def test_the_error_message_names_a_surplus_line(copied):
     with (copied / "session.jsonl").open("ab") as journal:
         chain = ChecksumChain(read_journal(copied / "session.jsonl").crc)
         journal.write(chain.line({"t": 99999.0, "client": "client1", "dir": ">", "text": "*IDN?"}) + b"\n")
@@ -290,7 +290,7 @@ def test_a_session_that_is_being_written_is_not_resumed(copied):
 
 
 @pytest.mark.slow
-def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch):
+def test_strips_of_all_cases_resume_where_they_were_interrupted(tmp_path, monkeypatch):
     """Interrupted in the second of two sessions, here of one model each."""
     monkeypatch.setattr(strip_combinations, "CASES", {case: strip_combinations.CASES[case] for case in "AB"})
     light = load_scenario("akwanga", LIGHT)
@@ -319,7 +319,7 @@ def test_strips_of_all_cases_go_on_where_they_were_cut_off(tmp_path, monkeypatch
     assert (cut / "results.json").read_bytes() == (whole / "results.json").read_bytes()
 
 
-def test_resume_takes_nothing_beside_it(whole, capsys):
+def test_resume_accepts_no_other_option(whole, capsys):
     for extra in (["akwanga"], ["--seed", "7"], ["--out", "x"]):
         done = a7sim_captured(capsys, "run", "--resume", whole, *extra)
         assert done.returncode == 2
@@ -334,7 +334,7 @@ def journalled_events(out):
     return [journalled.event(number) for number in range(2, len(journalled) + 1)]
 
 
-def test_a_server_that_is_killed_goes_on_with_all_that_two_clients_registered(tmp_path, capsys):
+def test_a_killed_server_resumes_with_all_registrations_of_two_clients(tmp_path, capsys):
     out = tmp_path / "out"
     with RunningServer(*ANY_TCP_PORT, "--out", str(out)) as first:
         one, other = first.line(), first.line()
@@ -356,7 +356,7 @@ def test_a_server_that_is_killed_goes_on_with_all_that_two_clients_registered(tm
     assert a7sim_captured(capsys, "replay", out, "--verify", "--quiet").returncode == 0
 
 
-def test_a_server_that_asked_for_a_token_goes_on_with_one(tmp_path, capsys):
+def test_a_server_with_a_token_resumes_with_a_token(tmp_path, capsys):
     out = tmp_path / "out"
     with RunningServer(*ANY_TCP_PORT, "--out", str(out), A7SIM_TOKEN="sesame") as first:
         line = first.line()
@@ -371,11 +371,11 @@ def test_a_server_that_asked_for_a_token_goes_on_with_one(tmp_path, capsys):
     assert a7sim_captured(capsys, "replay", out, "--verify", "--quiet").returncode == 0
 
 
-# --- what cannot be written -------------------------------------------------------------------------------
+# --- write errors -------------------------------------------------------------------------------
 
 
 def with_files_of_at_most(size):
-    """Make writing beyond so many bytes of a file fail, after what there is room for: a disk that is full."""
+    """Make writing beyond `size` bytes of a file fail, as on a full disk."""
 
     def limit():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -384,7 +384,7 @@ def with_files_of_at_most(size):
     return limit
 
 
-def test_a_run_on_a_full_disk_stops_in_a_sentence_and_goes_on_when_there_is_room(whole, tmp_path):
+def test_a_run_on_a_full_disk_stops_with_a_message_and_resumes_when_there_is_space(whole, tmp_path):
     out = tmp_path / "out"
     command = ("run", "dewitt-pair", "--seed", "7", *SETTINGS, "--out", out)
     done = a7sim(*command, preexec_fn=with_files_of_at_most(100_001))
@@ -398,7 +398,7 @@ def test_a_run_on_a_full_disk_stops_in_a_sentence_and_goes_on_when_there_is_room
     assert files_of(out) == files_of(whole)
 
 
-def test_a_server_on_a_full_disk_says_so_and_acknowledges_nothing_that_is_not_written(tmp_path):
+def test_a_server_on_a_full_disk_reports_it_and_acknowledges_only_written_lines(tmp_path):
     out = tmp_path / "out"
     with RunningServer(*ANY_TCP_PORT, "--out", str(out), preexec_fn=with_files_of_at_most(20_000)) as running:
         one, other = running.line(), running.line()
@@ -415,7 +415,7 @@ def test_a_server_on_a_full_disk_says_so_and_acknowledges_nothing_that_is_not_wr
     assert acknowledged > 50
 
 
-def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
+def test_a_half_written_line_is_removed(tmp_path, monkeypatch):
     file = AppendOnlyFile(tmp_path / "f", "none")
     file.add(b"one\n")
     writes = iter([2, OSError(errno.ENOSPC, "No space left on device")])
@@ -441,7 +441,7 @@ def test_a_line_half_written_is_taken_back(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("command", ["run", "serve"])
-def test_a_folder_that_cannot_be_written_is_said_before_anything_starts(tmp_path, command, capsys):
+def test_a_folder_that_cannot_be_written_is_reported_before_the_start(tmp_path, command, capsys):
     (tmp_path / "file").write_text("")
     done = a7sim_captured(
         capsys, command, "akwanga", "--out", tmp_path / "file" / "out", *(ANY_TCP_PORT if command == "serve" else ())
@@ -452,7 +452,7 @@ def test_a_folder_that_cannot_be_written_is_said_before_anything_starts(tmp_path
 
 
 @pytest.mark.parametrize("call", ["open", "ftruncate"])
-def test_a_journal_on_a_read_only_disk_is_said_in_a_sentence(tmp_path, monkeypatch, call):
+def test_a_journal_on_a_read_only_disk_is_reported_in_one_sentence(tmp_path, monkeypatch, call):
     def refused(*_):
         raise OSError(errno.EROFS, "Read-only file system")
 
@@ -482,14 +482,14 @@ def synced(tmp_path, monkeypatch, durability, lines, waits=False):
     return count, times[0] - began if times else None
 
 
-def test_registrations_are_on_the_disk_at_once_and_all_else_within_a_fifth_of_a_second(tmp_path, monkeypatch):
+def test_registrations_are_on_the_disk_at_once_and_other_lines_within_a_fifth_of_a_second(tmp_path, monkeypatch):
     assert synced(tmp_path, monkeypatch, "records", [False, True, False, True])[0] == 2
     count, first = synced(tmp_path, monkeypatch, "records", [False], waits=True)
     assert count == 0
     assert first < append_file.SYNCED_WITHIN_S
 
 
-def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):
+def test_durability_always_syncs_every_line_and_none_syncs_no_line(tmp_path, monkeypatch):
     assert synced(tmp_path, monkeypatch, "always", [False, True, False])[0] == 3
     assert synced(tmp_path, monkeypatch, "none", [False, True, False]) == (0, None)
 
@@ -498,7 +498,7 @@ def test_always_and_none_are_what_they_say(tmp_path, monkeypatch):
     ("line", "registers"),
     [('REC "a"', True), ('record "a",BY1', True), (':REC:STR 1,"x"', True), ("REC:COUN?", False), ("COUN?", False)],
 )
-def test_what_registers_is_known_by_its_line(tmp_path, monkeypatch, line, registers):
+def test_a_line_that_registers_is_recognised_by_its_text(tmp_path, monkeypatch, line, registers):
     at_once = []
     monkeypatch.setattr(AppendOnlyFile, "add", lambda self, line, now=False: at_once.append(now))
     journal = Journal().recording(tmp_path, Header({"schema_version": 3}), None)
@@ -534,16 +534,16 @@ def test_a_changed_reply_stops_the_replay_with_both_lines_and_the_state(copied, 
 
     (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
     done = a7sim_captured(capsys, "replay", copied, "--verify", "--quiet")
-    said = journalled.event(number).text
+    original = journalled.event(number).text
     assert done.returncode == 3
     assert done.stderr.splitlines() == [
         f"a7sim: {copied}/session.jsonl, line {number}: the first difference",
-        f"a7sim: the journal has      client1 < 1{said}",
-        f"a7sim: the instrument says  client1 < {said}",
+        f"a7sim: the journal has      client1 < 1{original}",
+        f"a7sim: the instrument says  client1 < {original}",
     ]
 
 
-def test_a_replay_that_only_tells_goes_on_beyond_a_difference_and_counts_it(copied, capsys):
+def test_a_replay_without_verification_continues_after_a_difference_and_counts_it(copied, capsys):
     journalled = read_journal(copied / "session.jsonl")
     number = next(n for n in range(3000, len(journalled)) if "COUN" in journalled.event(n).text) + 1
 
@@ -552,13 +552,13 @@ def test_a_replay_that_only_tells_goes_on_beyond_a_difference_and_counts_it(copi
 
     (copied / "session.jsonl").write_bytes(forged(journalled, change=change))
     done = a7sim_captured(capsys, "replay", copied)
-    told = done.stdout.splitlines()
+    printed = done.stdout.splitlines()
     assert not done.returncode
-    assert [line.split(None, 1)[1] for line in told if line.startswith("   differs ")] == [
+    assert [line.split(None, 1)[1] for line in printed if line.startswith("   differs ")] == [
         f"client1 < {journalled.event(number).text}"
     ]
-    assert len(told) == len(journalled) + 1
-    assert told[-1].endswith(": 1 different")
+    assert len(printed) == len(journalled) + 1
+    assert printed[-1].endswith(": 1 different")
     assert f"line {number}: the first difference" in done.stderr.splitlines()[0]
 
 
@@ -570,11 +570,11 @@ def test_a_replay_that_only_tells_goes_on_beyond_a_difference_and_counts_it(copi
         ((".", "--out", "out"), "--out: expected a script, got a session, which already has a journal"),
     ],
 )
-def test_what_a_script_or_a_journal_cannot_take_is_refused_in_one_sentence(typed, words, sentence):
+def test_an_invalid_option_of_a_replay_is_refused_in_one_sentence(typed, words, sentence):
     assert typed("replay", *words) == (2, "", f"a7sim: {sentence}\n")
 
 
-def test_a_script_of_which_the_instrument_says_otherwise_ends_with_exit_code_3_and_both(typed, tmp_path):
+def test_a_script_with_other_replies_ends_with_exit_code_3_and_both_replies(typed, tmp_path):
     script = tmp_path / "mine.a7s"
     script.write_text("scenario akwanga seed 4\nDRIV:X 1.20\nexpect COUN:X? = 9.5\n", encoding="utf-8")
     code, printed, complained = typed("replay", script, "--json")
@@ -585,7 +585,7 @@ def test_a_script_of_which_the_instrument_says_otherwise_ends_with_exit_code_3_a
     assert "9.5" in difference["expected"] and "1.20" in difference["got"]
 
 
-def test_a_changed_command_shows_in_what_the_state_differs(copied, capsys):
+def test_a_changed_command_shows_the_differences_of_the_state(copied, capsys):
     journalled = read_journal(copied / "session.jsonl")
     number = next(n for n in range(2, len(journalled)) if journalled.event(n).text.startswith("PROJ1:PDIS "))
 
@@ -600,8 +600,8 @@ def test_a_changed_command_shows_in_what_the_state_differs(copied, capsys):
     assert any(line.startswith("a7sim: state, autograph.spindles.c1: [") for line in done.stderr.splitlines())
 
 
-def test_lines_left_over_fail(copied, capsys):
-    """A reply that the journal ends before, and one in it that nobody asked for."""
+def test_surplus_lines_fail(copied, capsys):
+    """The journal lacks its last reply, or has a reply without a query."""
     journalled = read_journal(copied / "session.jsonl")
     last = max(n for n in range(2, len(journalled)) if journalled.event(n).dir == "<")
     chain = ChecksumChain(int(json.loads(journalled.lines[last - 1])["crc"], 16))
@@ -625,7 +625,7 @@ def test_lines_left_over_fail(copied, capsys):
     ("begin", "first"),
     [("@100", lambda n, e: n == 100), ("0:30:00", lambda n, e: e.t >= 1800.0), ("2000.5", lambda n, e: e.t >= 2000.5)],
 )
-def test_a_replay_tells_from_a_line_or_a_time_on(whole, begin, first, capsys):
+def test_a_replay_prints_from_a_line_or_a_time(whole, begin, first, capsys):
     journalled = read_journal(whole / "session.jsonl")
     number = next(n for n in range(2, len(journalled)) if first(n, journalled.event(n)))
     done = a7sim_captured(capsys, "replay", whole, "--from", begin, "--verify")
@@ -634,7 +634,7 @@ def test_a_replay_tells_from_a_line_or_a_time_on(whole, begin, first, capsys):
     assert done.stdout.split()[0] == f"{journalled.event(number).t:.2f}"
 
 
-def test_a_replay_tells_from_a_note_on(whole, capsys):
+def test_a_replay_prints_from_a_note(whole, capsys):
     done = a7sim_captured(capsys, "replay", whole, "--from", "left perspective centre")
     assert done.stdout.splitlines()[0].endswith('client1   > NOTE "1: left perspective centre"')
     assert done.returncode == 0
@@ -643,7 +643,7 @@ def test_a_replay_tells_from_a_note_on(whole, capsys):
     assert "--from coffee: expected a time, @LINE or the text of a note" in done.stderr
 
 
-def test_a_replay_goes_at_the_speed_that_is_asked_for(monkeypatch):
+def test_a_replay_runs_at_the_requested_speed(monkeypatch):
     slept = []
     clock = Clock()
     monkeypatch.setattr(time, "monotonic", lambda: clock.now)
@@ -664,7 +664,7 @@ def test_a_journal_of_every_version_replays_for_ever(path, capsys):
 # --- record -----------------------------------------------------------------------------------------------
 
 
-def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, capsys):
+def test_lines_of_a_client_and_an_instrument_are_recorded_and_replay(tmp_path, capsys):
     out = tmp_path / "recorded"
     with RunningServer(*ANY_TCP_PORT) as served:
         command = ["record", served.listening[0]["url"], "--scenario", "akwanga", "--out", str(out), "--json"]
@@ -691,7 +691,7 @@ def test_what_a_client_and_an_instrument_say_is_recorded_and_replays(tmp_path, c
     assert a7sim_captured(capsys, "replay", out, "--verify", "--quiet").returncode == 0
 
 
-def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, capsys):
+def test_a_record_of_an_unknown_instrument_is_printed_and_not_verified(tmp_path, capsys):
     with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
         journal.on_link_event(LinkEvent(1.0, "client1", ">", "*IDN?"))
     done = a7sim_captured(capsys, "replay", tmp_path)
@@ -701,8 +701,8 @@ def test_a_record_of_an_unknown_instrument_is_told_and_not_verified(tmp_path, ca
     assert "expected a session whose scenario is known" in done.stderr
 
 
-def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_word_does(tmp_path, monkeypatch):
-    """Who goes is not held up by a full disk; nothing else is acknowledged that is not written."""
+def test_a_client_may_leave_without_a_writable_journal_and_any_other_event_needs_one(tmp_path, monkeypatch):
+    """A full disk does not stop a client from leaving; all else is acknowledged only if written."""
     with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
 
         def full(*_, **__):
@@ -714,8 +714,8 @@ def test_a_client_that_goes_needs_no_journal_that_can_be_written_and_any_other_w
             journal.on_link_event(LinkEvent(2.0, "client1", ">", "*IDN?"))
 
 
-def test_what_a_replay_only_tells_is_not_told_where_it_is_to_be_quiet(tmp_path, capsys):
+def test_a_quiet_replay_without_verification_prints_nothing(tmp_path, capsys):
     with Journal().recording(tmp_path, make_header_without_scenario("record", instrument="a7"), None) as journal:
         journal.on_link_event(LinkEvent(1.0, "client1", ">", "*IDN?"))
-    told = a7sim_captured(capsys, "replay", tmp_path, "--quiet")
-    assert (told.returncode, told.stdout) == (0, "")
+    quiet = a7sim_captured(capsys, "replay", tmp_path, "--quiet")
+    assert (quiet.returncode, quiet.stdout) == (0, "")

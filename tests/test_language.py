@@ -1,4 +1,4 @@
-"""The command language, as protocol.md promises it at the door; where that is silent, IEEE 488.2 and SCPI-1999."""
+"""The command language by protocol.md; where it states nothing, by IEEE 488.2 and SCPI-1999."""
 
 import re
 import zlib
@@ -114,7 +114,7 @@ EXAMPLES = {
     "RECord:STRike:COUNt?": "",
     "NOTE": '"coffee"',
 }
-"""Every header of protocol.md, and what came to it, with parameters that a mounted model takes."""
+"""Headers of protocol.md and later ones, with parameters that a mounted model accepts."""
 
 NOT_ON_AN_A7 = {"COMMon:PHI", "COMMon:PHI?", "COMMon:PHI:TURN"}
 
@@ -141,7 +141,7 @@ POSITIONS = ";:".join(
         "BASE:MODE?;:FITT:DOVE?;TRI?;DIAP?;XCOL?;YCOL?;:GEAR:HEIG?;PLAN?;:COUN?;:PHOT1?;:PHOT2?;:REC:COUN?",
     ]
 )
-"""A line that asks for all that can move."""
+"""A line that queries all that can move."""
 
 
 def in_full(header: str) -> str:
@@ -162,7 +162,7 @@ def test_help_lists_every_header_of_the_protocol_and_no_other():
 
 @pytest.mark.parametrize("form", [in_short, in_full])
 @pytest.mark.parametrize("header", EXAMPLES)
-def test_every_header_answers_or_obeys_in_both_forms(header, form):
+def test_every_header_replies_or_acts_in_both_forms(header, form):
     client = with_model()
     client.query('REC "1021"')
     reply = client.feed(f"{form(header)} {EXAMPLES[header]}\n".encode())
@@ -260,7 +260,7 @@ def test_every_line_begins_at_the_root():
 
 
 @pytest.mark.parametrize("line", ["", " ", "\t", ";", ";;", " ; ; ", "\r"])
-def test_nothing_between_semicolons_is_nothing(line):
+def test_empty_units_between_semicolons_are_ignored(line):
     client = EngineClient()
     assert client.query(line) == ""
     assert client.errors() == []
@@ -280,7 +280,7 @@ def test_a_command_never_answers():
     assert EngineClient().query("*CLS;*ESE 1;:PROJ1:KAPP 5;:NOTE 'x';*OPC;*WAI") == ""
 
 
-def test_one_bad_query_among_good_ones_answers_nothing_and_queues_an_error():
+def test_a_bad_query_between_good_queries_gives_no_reply_and_queues_an_error():
     client = EngineClient()
     assert client.query("PROJ1:KAPP?;:FOO?;:PROJ1:PHI?;OMEG? 7;BY?") == "0.00;100.00;0.00"
     assert client.errors() == [-113, -104]
@@ -293,7 +293,7 @@ def test_lines_end_in_lf_crlf_or_cr(end):
     assert client.errors() == []
 
 
-def test_off_the_serial_line_a_cr_alone_ends_nothing():
+def test_without_a_serial_line_a_cr_alone_does_not_end_a_line():
     client = EngineClient(cr_ends_line=False)
     assert client.feed(b"*OPC?\r\n") == b"1\n"
     assert client.feed(b"*OPC?\r*TST?") == b""
@@ -319,7 +319,7 @@ def test_a_line_of_4096_bytes_is_obeyed_and_one_more_is_dropped_whole(end, cr_en
     assert client.errors() == [-363]
 
 
-def test_a_cr_that_ends_nothing_counts_among_the_bytes_of_its_line():
+def test_a_cr_that_ends_no_line_counts_as_a_byte_of_its_line():
     client = EngineClient(cr_ends_line=False)
     assert client.feed(b"*OPC?".ljust(4096) + b"\r;*OPC?\n") == b""
     assert client.errors() == [-363]
@@ -549,7 +549,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("number", "line"), [(number, line) for number, lines in REFUSED.items() for line in lines])
-def test_what_is_refused_answers_nothing_moves_nothing_and_queues_its_number(number, line):
+def test_a_refused_line_gives_no_reply_moves_nothing_and_queues_its_number(number, line):
     client = EngineClient()
     before = client.query(POSITIONS)
     assert client.query(line) == ""
@@ -557,7 +557,7 @@ def test_what_is_refused_answers_nothing_moves_nothing_and_queues_its_number(num
     assert client.query(POSITIONS) == before
 
 
-def test_an_error_says_its_number_its_message_and_what_was_expected():
+def test_an_error_has_its_number_its_message_and_the_expected_value():
     client = EngineClient()
     client.query('PROJ1:PHI 200;:PROJ1:KAPP "5"')
     assert re.fullmatch(r'-222,"Data out of range;[^"]*expected 70\.00 to 106\.00, got 200"', client.query("SYST:ERR?"))
@@ -579,7 +579,7 @@ def test_clients_share_the_instrument():
     assert second.query("BASE:BX?") == "20.00"
 
 
-def test_whoever_holds_the_lock_turns_alone_and_the_others_may_look():
+def test_only_the_holder_of_the_lock_moves_parts_and_other_clients_may_query():
     first, second = two_clients()
     assert (first.query("SYST:LOCK:REQ?"), second.query("SYST:LOCK:REQ?")) == ("1", "0")
     assert first.query("SYST:LOCK:REQ?") == "1"
@@ -626,7 +626,7 @@ def test_a_client_that_leaves_frees_its_lock_and_no_others():
     assert third.query("SYST:LOCK:REQ?;:BASE:BX 20;BX?") == "1;20.00"
 
 
-def test_the_queue_and_the_registers_are_each_clients_own():
+def test_each_client_has_its_own_queue_and_registers():
     first, second = two_clients()
     first.query("FOO;*ESE 7")
     assert second.query("SYST:ERR:COUN?;*ESE?") == "0;0"
@@ -646,7 +646,7 @@ def test_the_queue_holds_32_and_overflows_into_its_last_entry():
 # --- common commands and the status model --------------------------------------------------------------
 
 
-def test_the_instrument_says_who_it_is():
+def test_the_instrument_identifies_itself():
     assert EngineClient().query("*IDN?") == f"WILD HEERBRUGG,A7,0,{a7sim.__version__}"
     assert with_photographs().query("*IDN?") == f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
     assert EngineClient().query("SYST:VERS?;*OPC?;*TST?;*WAI") == "1999.0;1;0"
@@ -668,7 +668,7 @@ def test_events_raise_their_bits(line, bit):
     assert client.query("*ESR?;*ESR?") == f"{bit};0"
 
 
-def test_the_status_byte_sums_up_what_is_enabled():
+def test_the_status_byte_summarises_the_enabled_registers():
     client = EngineClient()
     assert client.query("*CLS;*STB?;FOO;*STB?") == "0;4"
     assert client.query("*ESE 32;*STB?") == str(4 + 32)
@@ -681,7 +681,7 @@ def test_enable_masks_read_back_and_bit_6_cannot_ask_for_service():
 
 
 @pytest.mark.parametrize(("node", "register", "summary"), [("OPER", "operation", 128), ("QUES", "questionable", 8)])
-def test_a_register_keeps_what_rose_until_it_is_read(node, register, summary):
+def test_a_register_keeps_its_bits_until_it_is_read(node, register, summary):
     client = EngineClient()
     status = getattr(client.engine.status, register)
     status.set_condition(16)
@@ -794,7 +794,7 @@ def test_limits_hold_behind_a_preset():
         ("0.5", "-300.00", "-270.00", "-240.00"),
     ],
 )
-def test_a_height_gear_goes_on_from_what_the_counter_shows_with_decimals_of_its_own(gear, shown, turned, carriage):
+def test_a_height_gear_continues_from_the_counter_reading_with_its_own_decimals(gear, shown, turned, carriage):
     client = EngineClient()
     assert client.query(f"GEAR:HEIG {gear};:COUN:Z?;:WHE:Z 30;:COUN:Z?") == f"{shown};{turned}"
     assert client.query("GEAR:HEIG?") == gear.replace("'", '"')
@@ -815,7 +815,7 @@ def test_the_plan_gear_is_a_combination_or_a_number(gear, answer):
     assert EngineClient().query(f"GEAR:PLAN {gear};PLAN?") == answer
 
 
-def test_handwheels_turn_by_so_much_counter():
+def test_handwheels_turn_by_units_of_the_counter():
     client = EngineClient()
     assert client.query("WHE:X 5;Y 6;Z 7;X -2;:COUN?") == "3.00,6.00,-293.00"
 
@@ -838,7 +838,7 @@ def test_a_collar_that_does_not_belong_to_the_picture_reverses_its_handwheel(col
         ("DRIV:Z -140;Y 200", "PROJ1:BZ -10"),
     ],
 )
-def test_where_the_rods_cannot_go_nothing_moves(before, line):
+def test_nothing_moves_beyond_the_range_of_the_rods(before, line):
     client = EngineClient()
     client.query(before)
     assert client.errors() == []
@@ -924,7 +924,7 @@ def test_the_triangulation_lever_exchanges_the_eyepieces():
 
 
 @pytest.mark.parametrize("query", ["EYEP1?", "EYEP2?", "EYEP:STER?"])
-def test_what_is_outside_the_field_or_not_there_is_not_visible(query):
+def test_a_point_outside_the_field_or_missing_is_not_visible(query):
     nothing = "9.91E37,9.91E37"
     client = with_model()
     assert client.query(f'{query} "C2"') == nothing
@@ -959,7 +959,7 @@ def test_the_journal_keeps_size_and_checksum_of_a_picture_only():
     assert heard[2].text == f"1;#block of {len(block)} bytes, crc32 {zlib.crc32(block):08x}"
 
 
-def test_no_query_gives_away_a_fault_of_the_instrument():
+def test_no_query_discloses_a_fault_of_the_instrument():
     faulty = ProjectorCondition(phi_zero_gon=0.5, kappa_zero_gon=0.3, by_zero_mm=0.2, principal_distance_mm=0.1)
     condition = Condition(left=faulty, right=faulty, bx_zero_mm=0.4, setting_sigma_mm=0.1, backlash_mm=0.1)
     line = f"PROJ1:PHI 99;KAPP 5;BY 3;:BASE:BX 20;:DRIV:X 10;:{POSITIONS}"
@@ -995,7 +995,7 @@ def test_struck_entries_stay_marked():
     assert client.errors() == [-222, -222]
 
 
-def test_all_that_crosses_the_link_is_heard_in_order_with_its_time():
+def test_the_listener_gets_all_lines_of_the_link_in_order_with_their_times():
     heard: list[LinkEvent] = []
     instrument = SharedInstrument(Autograph(VARIANTS["A7"]), heard.append)
     engine = instrument.open()

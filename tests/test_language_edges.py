@@ -99,8 +99,8 @@ def test_a_line_at_the_edge_of_the_grammar(line, reply, errors):
     assert client.errors() == errors
 
 
-def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
-    """The quick way of a line that is one plain query, taken while nobody listens, is that of all lines."""
+def test_a_plain_query_has_the_same_reply_with_and_without_a_listener():
+    """The fast path of one plain query without a listener gives the replies of the general path."""
     for new in (with_photographs, with_model, guarded):
         quick, heard = new(), new()
         heard.instrument.listener = [].append
@@ -111,7 +111,7 @@ def test_a_plain_query_is_answered_the_same_whether_anybody_listens():
                 assert queue(quick) == queue(heard)
 
 
-def test_a_listener_hears_a_line_whole_but_for_what_was_given_as_a_token():
+def test_a_listener_gets_a_whole_line_except_for_a_token():
     client = guarded()
     client.instrument.listener = (heard := []).append
     client.query("""SYST:LOG "ours""; yours";*OPC?;:SYST:LOGIN 'heerbrugg';*OPC?""")

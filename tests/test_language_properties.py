@@ -48,7 +48,7 @@ received = st.lists(
 
 @quick
 @given(received)
-def test_no_bytes_whatever_raise(flood):
+def test_no_bytes_raise_an_error(flood):
     client = EngineClient()
     client.feed(flood + b"\n")
     client.feed(b"\n*CLS\n")

@@ -45,7 +45,7 @@ def test_without_any_error_heights_at_control_agree_within_one_unit_of_the_count
     assert max(abs(round(each, 2)) for each in found.heights.values()) <= A_COUNT_OF_HEIGHT_M
 
 
-def test_oriented_by_counts_of_a_hundredth_of_a_gon_they_agree_within_a_third_of_what_is_tolerated():
+def test_after_numerical_orientation_heights_agree_within_a_third_of_the_tolerance():
     """Numerical relative orientation sets its elements by their counters: what they round away deforms the model."""
     found = levelled(without_errors(scenario_of(**{"plan.procedure": '"numerical"'})))[1].on_ground
     assert A_COUNT_OF_HEIGHT_M < max(map(abs, found.heights.values())) < found.tolerated / 3.0
@@ -59,11 +59,11 @@ def test_the_counter_reads_metres_at_the_scale_of_its_gear(without_any_error):
 
 
 def test_checks_can_then_be_read_in_ground_units(without_any_error):
-    crowd, record = without_any_error
+    batch, record = without_any_error
     checks = [name for name in record.on_ground.points if name.startswith("K")]
     assert len(checks) >= 2
     for name in checks:
-        assert record.on_ground.points[name][2] == pytest.approx(crowd.scenes[0].ground_points[name][2], abs=0.2)
+        assert record.on_ground.points[name][2] == pytest.approx(batch.scenes[0].ground_points[name][2], abs=0.2)
 
 
 def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_error):
@@ -77,18 +77,18 @@ def test_the_relative_orientation_is_untouched_but_for_rounding(without_any_erro
     assert record.on_ground.elements["phi1"] != record.on_ground.before["phi1"]
 
 
-def test_afterwards_everything_stands_as_it_did(without_any_error):
+def test_afterwards_the_instrument_has_its_former_settings(without_any_error):
     """Elements, gear and counters: the instrument reads a point as it read it before."""
-    crowd, record = without_any_error
-    bench, active = crowd.workstation, crowd.workstation.operators.active
-    shown = bench.controls.elements(active, list(record.on_ground.before))
+    batch, record = without_any_error
+    workstation, active = batch.workstation, batch.workstation.operators.active
+    shown = workstation.controls.elements(active, list(record.on_ground.before))
     assert {name: each[0] for name, each in shown.items()} == record.on_ground.before
-    assert bench.controls.units_per_mm == record.z_units_per_mm == 8.0
-    again = bench.measure_points(active, ["K1"])[:, 0, 0]
+    assert workstation.controls.units_per_mm == record.z_units_per_mm == 8.0
+    again = workstation.measure_points(active, ["K1"])[:, 0, 0]
     assert again == pytest.approx(record.points["K1"], abs=0.015)
 
 
-def test_a_person_with_errors_comes_within_what_is_tolerated_too():
+def test_an_operator_with_errors_levels_within_the_tolerance():
     (document,) = open_batch(scenario_of(), [7]).run()
     found = document["models"][0]["absolute_orientation"]
     assert found["agrees"]
@@ -97,7 +97,7 @@ def test_a_person_with_errors_comes_within_what_is_tolerated_too():
     session_tables(document)
 
 
-def test_an_a8_is_levelled_by_what_it_has():
+def test_an_a8_is_levelled_by_its_own_elements():
     """Common Phi, equal changes of omega as far as counters show, and the base; everything else stays."""
     a8 = {"instrument.variant": '"A8"', "models.1.base": '"inside"', "plan.procedure": '"empirical"'}
     found = levelled(without_errors(scenario_of(**a8)))[1].on_ground
@@ -107,15 +107,15 @@ def test_an_a8_is_levelled_by_what_it_has():
     assert changes["omega1"] == pytest.approx(changes["omega2"], abs=0.0101)
 
 
-def test_too_little_control_is_left_alone():
-    """Two heights do not level a model: nothing is turned, and the day goes on."""
+def test_a_model_with_too_little_control_is_not_levelled():
+    """Two heights do not level a model: nothing is turned, and the session continues."""
     scenario = without_errors(scenario_of())
     ground = [
         msgspec.structs.replace(p, role="control" if p.point in ("C1", "C2") else "check") for p in scenario.ground
     ]
-    crowd, record = levelled(msgspec.structs.replace(scenario, ground=ground))
+    batch, record = levelled(msgspec.structs.replace(scenario, ground=ground))
     assert record.on_ground is None
-    assert crowd.workstation.operators.reasons == {}
+    assert batch.workstation.operators.reasons == {}
 
 
 SETTINGS = {

@@ -1,4 +1,4 @@
-"""Whatever an operator does, a session ends in one way: journal, book and results are there, whole."""
+"""Every session ends with a complete journal, book and results."""
 
 import json
 
@@ -35,7 +35,7 @@ def results_of(out):
 
 
 @pytest.mark.parametrize("what", list(WORK))
-def test_who_is_interrupted_leaves_whole_files(what, tmp_path):
+def test_an_interrupted_session_leaves_complete_files(what, tmp_path):
     work, name = WORK[what]
     out = tmp_path / "out"
 
@@ -49,12 +49,12 @@ def test_who_is_interrupted_leaves_whole_files(what, tmp_path):
     assert document["operator"]["book_entries"] == len((out / "book.csv").read_text().splitlines()) - 1
     header, *events = map(json.loads, (out / "session.jsonl").read_text().splitlines())
     assert header["seed"] == 1
-    said = [event for event in events if event.get("dir") in (">", "<")]
-    assert len(said) == document["operator"]["lines_over_the_link"]
+    lines = [event for event in events if event.get("dir") in (">", "<")]
+    assert len(lines) == document["operator"]["lines_over_the_link"]
 
 
 @pytest.mark.parametrize("what", ["run", "compile"])
-def test_who_gives_up_says_why_and_the_document_is_the_file(what, tmp_path):
+def test_an_operator_that_gives_up_reports_the_reason_and_the_document_equals_the_file(what, tmp_path):
     work, name = WORK[what]
     scenario = load_scenario(name, {"photos.0.laid": '"upside down"'})
     document = work(scenario, 1, RunOptions(tmp_path / "out"))
@@ -63,7 +63,7 @@ def test_who_gives_up_says_why_and_the_document_is_the_file(what, tmp_path):
     assert results_of(tmp_path / "out") == json.loads(json.dumps(document))
 
 
-def test_what_fails_for_another_reason_says_so_in_the_file_and_goes_on_up(tmp_path):
+def test_another_error_is_written_to_the_file_and_raised(tmp_path):
     def fail(_):
         raise A7SimError("the lamp has burnt out")
 

@@ -110,7 +110,7 @@ def test_a_timeout_of_zero_does_not_wait(port):
 @pytest.mark.parametrize(
     ("read", "expected"), [(lambda port: port.read(2), b"1\n"), (lambda port: port.readline(), b"1\n")]
 )
-def test_without_a_timeout_a_read_waits_for_whoever_writes(port, read, expected):
+def test_without_a_timeout_a_read_waits_for_a_write(port, read, expected):
     port.timeout = None
     got = []
     reader = threading.Thread(target=lambda: got.append(read(port)), daemon=True)
@@ -276,7 +276,7 @@ def test_a_bad_scenario_file_is_one_line_that_names_it(tmp_path, text):
 # --- several ports at one instrument -------------------------------------------------------------------------
 
 
-def test_ports_at_one_desk_share_instrument_and_lock_and_a_closed_port_frees_it():
+def test_ports_at_one_instrument_share_it_and_its_lock_and_a_closed_port_frees_the_lock():
     instrument = SharedInstrument(Autograph(VARIANTS["A7"]))
     first, second = (
         InProcessSerial(instrument=instrument, timeout=SHORT),
@@ -303,7 +303,7 @@ def test_lines_cross_at_the_time_of_the_clock():
     ]
 
 
-def test_a_port_without_a_desk_cannot_be_opened():
+def test_a_port_without_an_instrument_cannot_be_opened():
     with pytest.raises(serial.SerialException, match="expected an instrument"):
         InProcessSerial("anywhere")
 

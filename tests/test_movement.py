@@ -114,13 +114,13 @@ def test_wai_lets_the_next_unit_begin_when_the_movement_is_done(instrument, engi
     assert (engine.waits_until, instrument.busy_until) == (None, 11.0)
 
 
-def test_a_wait_that_ends_late_goes_on_from_then(instrument, engine):
+def test_a_wait_that_ends_late_continues_from_its_end(instrument, engine):
     engine.feed(b"DRIV:X 50;*WAI;X 0\n", 0.0)
     engine.feed(b"", 7.5)
     assert instrument.busy_until == 12.5
 
 
-def test_who_waits_does_not_wait_for_what_others_begin_meanwhile(instrument, engine):
+def test_a_waiting_client_does_not_wait_for_later_movements_of_other_clients(instrument, engine):
     other = instrument.open()
     engine.feed(b"DRIV:X 50;*OPC?\n", 0.0)
     other.feed(b"DRIV:X -200\n", 1.0)
@@ -128,7 +128,7 @@ def test_who_waits_does_not_wait_for_what_others_begin_meanwhile(instrument, eng
     assert engine.feed(b"", 5.0) == b"1\n"
 
 
-def test_others_go_on_while_one_waits(instrument, engine):
+def test_other_clients_continue_while_one_waits(instrument, engine):
     other = instrument.open()
     engine.feed(b"DRIV:X 50;*WAI\n", 0.0)
     assert other.feed(b"COUN:X?\n", 0.1) == b"50.00\n"
@@ -161,7 +161,7 @@ def test_a_movement_that_came_and_went_unseen_is_an_event(instrument, engine):
 
 
 @pytest.mark.parametrize("query", ["*ESR?", "*STB?", "STAT:OPER:COND?", "STAT:OPER?"])
-def test_who_waits_by_looking_at_the_status_lets_time_pass(query):
+def test_polling_the_status_advances_the_time(query):
     clock = Clock()
     with InProcessSerial(instrument=SharedInstrument(Autograph(VARIANTS["A7"])), clock=clock, timeout=0.1) as port:
         port.write(b"*CLS;DRIV:X 5;*OPC\n")
@@ -205,7 +205,7 @@ def test_a_flood_in_process_is_obeyed_to_its_end(engine):
         assert port.read(2 * 6000 + 2)[-2:] == b"0\n"
 
 
-def test_input_kept_back_is_bounded_and_what_is_lost_is_said_once(engine):
+def test_kept_input_is_bounded_and_its_loss_is_reported_once(engine):
     engine.feed(b"*CLS;DRIV:X 50;*WAI\n", 0.0)
     for _ in range(50):
         engine.feed(b"COUN:X?\n" * 1000, 1.0)
@@ -223,8 +223,8 @@ def test_a_line_is_not_lost_behind_a_wait_that_keeps_less_than_the_bound(engine)
 
 
 @pytest.mark.parametrize("line", [b"*RST;" * 200, b"EYEP:PICT? 300,300,1;" + b"PICT? 300,300,1;" * 10])
-def test_within_a_long_line_others_have_their_turn(engine, line):
-    """The engine gives way after so many units or bytes, and says so by waiting until the present time."""
+def test_other_clients_are_served_during_a_long_line(engine, line):
+    """The engine yields after a number of units or bytes and waits until the present time."""
     assert engine.feed(line + b":COUN:X?\n*TST?\n", 3.0) == b""
     turns, replies = 1, b""
     while engine.waits_until is not None:
@@ -235,7 +235,7 @@ def test_within_a_long_line_others_have_their_turn(engine, line):
     assert replies.endswith(b"0.00\n0\n")
 
 
-def test_what_a_line_cannot_reply_is_not_worked_out(engine):
+def test_replies_beyond_the_limit_of_a_line_are_not_computed(engine):
     """Thirty pictures in a line cost no more than the four that are begun; every one left out is an error."""
     client = EngineClient(engine.instrument)
     picture = engine.instrument.autograph.picture

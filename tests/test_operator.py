@@ -1,4 +1,4 @@
-"""What the operator must show: orientation, centres, coordinates through the eyepieces; and failing like a person."""
+"""Work of the operator through the eyepieces: orientation, centres, coordinates, and giving up."""
 
 import dataclasses
 import re
@@ -48,13 +48,13 @@ def centres_of_sweep():
 
 
 @pytest.mark.slow
-def test_every_session_of_the_sweep_comes_to_its_end():
+def test_every_session_of_the_sweep_ends():
     assert [document["message"] for document in sweep() if document["status"] != "complete"] == []
     assert len(models_of_sweep()) == 100
 
 
 @pytest.mark.slow
-def test_residual_parallaxes_are_those_of_the_thesis_or_better():
+def test_residual_parallaxes_equal_the_thesis_or_are_smaller():
     """T: 0.019 to 0.076 mm at model scale, over all fifteen points."""
     rms = [model["relative_orientation"]["rms_parallax_mm"] for model in models_of_sweep()]
     assert np.median(rms) < 0.025
@@ -183,7 +183,7 @@ def test_a_blunder_is_caught_by_comparing_by_and_by_and_struck_out():
     struck = [e for e in session.person.book.entries if e.struck and e.item in ("by1", "by2")]
     assert len(struck) >= 5
     for entry in struck:
-        fellows = [
+        neighbours = [
             float(e.reading) * (1.0 if e.item == "by1" else -1.0)
             for e in session.person.book.entries
             if (e.point, e.round, e.form) == (entry.point, entry.round, entry.form)
@@ -192,7 +192,7 @@ def test_a_blunder_is_caught_by_comparing_by_and_by_and_struck_out():
             and abs(e.number - entry.number) < 9
         ]
         sense = 1.0 if entry.item == "by1" else -1.0
-        assert min(abs(sense * float(entry.reading) - fellow) for fellow in fellows) > 0.03
+        assert min(abs(sense * float(entry.reading) - neighbour) for neighbour in neighbours) > 0.03
     assert record.orientation.rms < 0.05
 
 
@@ -224,7 +224,7 @@ def test_three_readings_of_by_and_three_of_by_are_taken_at_every_point():
 
 
 @pytest.mark.slow
-def test_the_mean_parallax_goes_on_by():
+def test_the_mean_parallax_is_set_on_by():
     document = sweep()[len(SEEDS) * CASES.index(load_scenario("akwanga").plan.case) + 8]
     assert document["seed"] == 8
     for model in document["models"]:
@@ -243,7 +243,7 @@ def test_dependent_orientation_leaves_the_photograph_that_is_oriented_already():
 
 
 def test_a_worn_instrument_disturbs_the_result():
-    """Faults of the condition come out in the geometry; the operator is not told."""
+    """Faults of the condition change the geometry; the operator does not know them."""
     worn = {
         "instrument.condition.left": "{ omega_zero_gon = 0.2, principal_point_um = [40.0, 0.0] }",
         "instrument.condition.backlash_mm": "0.02",
@@ -274,7 +274,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("what", list(WRONG))
-def test_wrong_handling_fails_as_a_person_would_with_a_remark_that_says_what(what):
+def test_wrong_handling_fails_with_a_remark_that_names_it(what):
     exchanges, word = WRONG[what]
     session = tampered_session(read_once(load_scenario("akwanga")), exchanges)
     with pytest.raises(OperatorGaveUp) as error:
@@ -290,7 +290,7 @@ def test_a_picture_upside_down_in_its_carrier_is_found_at_the_fiducials():
     assert document["models"] == []
 
 
-def test_prints_that_do_not_overlap_towards_each_other_are_noticed():
+def test_pictures_with_exchanged_names_are_detected_by_their_prints():
     """The pictures themselves have changed names: only the prints can show it."""
     session = open_session(load_scenario("akwanga"), 1)
     drawer = session.autograph._photographs
@@ -302,7 +302,7 @@ def test_prints_that_do_not_overlap_towards_each_other_are_noticed():
         list(measure_models(session.person, session.job))
 
 
-def test_a_wrong_picture_under_the_right_name_and_print_is_noticed():
+def test_a_wrong_picture_under_the_right_name_and_print_is_detected():
     """Projector 1 shows 103's picture though name, print and fiducials are those of 101."""
     session = open_session(load_scenario("akwanga"), 1)
     drawer = session.autograph._photographs
@@ -331,7 +331,7 @@ def test_pointings_that_do_not_meet_do_not_pass_for_a_centre():
 def test_nothing_that_crosses_the_link_depends_on_the_stations_or_the_ground():
     """The same film from another flight: every reply is the same but for the picture content."""
     scenario = read_once(load_scenario("akwanga"))
-    said = []
+    event_lists = []
     for shift in (0.0, 5000.0):
         lines = []
         session = open_session(scenario, 1, lambda event, lines=lines: lines.append((event.direction, event.text)))
@@ -341,8 +341,8 @@ def test_nothing_that_crosses_the_link_depends_on_the_stations_or_the_ground():
         for name in scene.ground_points:
             scene.ground_points[name] = scene.ground_points[name] + 2.0 * shift
         next(iter(measure_models(session.person, session.job)))
-        said.append([each for each in lines if each[0] in "<>"])
-    assert said[0] == said[1]
+        event_lists.append([each for each in lines if each[0] in "<>"])
+    assert event_lists[0] == event_lists[1]
 
 
 def test_faults_of_the_instrument_show_only_through_the_eyepieces():

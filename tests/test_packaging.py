@@ -1,4 +1,4 @@
-"""What is built: the wheel has all that comes with a7sim, works away from the checkout, and the sdist makes the same
+"""Built packages: the wheel is complete and works without the checkout, and the sdist makes the same
 wheel (issue 10)."""
 
 import json
@@ -52,21 +52,21 @@ def contents(wheel):
 @pytest.fixture(scope="module")
 def away(wheel, tmp_path_factory):
     """Run the wheel's a7sim with the libraries that are here, but without the checkout, in an empty folder."""
-    there = tmp_path_factory.mktemp("installed")
+    installation = tmp_path_factory.mktemp("installed")
     with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(there / "site")
-    (there / "empty").mkdir()
-    (there / "without").mkdir()
+        archive.extractall(installation / "site")
+    (installation / "empty").mkdir()
+    (installation / "without").mkdir()
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "A7SIM"))}
     program = "import sys; sys.path.insert(0, sys.argv.pop(1)); blocked = sys.argv.pop(1).split(','); \
 sys.modules.update(dict.fromkeys(filter(None, blocked))); from a7sim.cli import main; main()"
 
     def typed(*words, without=""):
-        command = [sys.executable, "-c", program, there / "site", without, *words]
+        command = [sys.executable, "-c", program, installation / "site", without, *words]
         return subprocess.run(
             command,
-            cwd=there / "empty",
-            env=environment | {"A7SIM_HOME": str(there / "home")},
+            cwd=installation / "empty",
+            env=environment | {"A7SIM_HOME": str(installation / "home")},
             capture_output=True,
             text=True,
             check=False,
@@ -75,7 +75,7 @@ sys.modules.update(dict.fromkeys(filter(None, blocked))); from a7sim.cli import 
     return typed
 
 
-def test_the_wheel_has_all_that_comes_with_a7sim(contents):
+def test_the_wheel_has_all_files_of_a7sim(contents):
     in_package = {name.removeprefix("a7sim/") for name in contents if name.startswith("a7sim/")}
     for kind in ("scenarios", "exercises", "studies"):
         files = {str(path.relative_to(ROOT)) for path in (ROOT / kind).rglob("*") if path.is_file()}
@@ -86,9 +86,9 @@ def test_the_wheel_has_all_that_comes_with_a7sim(contents):
     assert not [name for name in contents if re.match(r"(tests|docs|benchmarks)/", name) or name.endswith(".pyc")]
 
 
-def test_the_wheel_says_what_it_needs_and_what_it_is(contents):
-    said = next(text.decode() for name, text in contents.items() if name.endswith("/METADATA"))
-    metadata = Parser().parsestr(said)
+def test_the_metadata_of_the_wheel_are_complete(contents):
+    metadata_text = next(text.decode() for name, text in contents.items() if name.endswith("/METADATA"))
+    metadata = Parser().parsestr(metadata_text)
     assert metadata["Version"] == a7sim.__version__
     assert metadata["Requires-Python"] == PROJECT["requires-python"]
     assert set(metadata.get_all("Provides-Extra")) == set(PROJECT["optional-dependencies"])
@@ -114,7 +114,7 @@ def test_the_sdist_makes_the_same_wheel(sdist, contents, tmp_path):
     assert (source / "Makefile").is_file()
 
 
-def test_it_works_away_from_the_checkout(away):
+def test_the_wheel_works_without_the_checkout(away):
     assert away("--version").stdout == f"a7sim, version {a7sim.__version__}\n"
     run = away("run", "dewitt-pair", "--json")
     assert run.returncode == 0, run.stderr
@@ -136,7 +136,7 @@ def test_it_works_away_from_the_checkout(away):
         (["report", "session"], "matplotlib", "report"),
     ],
 )
-def test_what_needs_an_extra_says_so_in_one_sentence(away, gave_up_folder, words, without, extra):
+def test_a_command_that_needs_an_extra_reports_it_in_one_sentence(away, gave_up_folder, words, without, extra):
     given = [str(gave_up_folder) if word == "session" else word for word in words]
     done = away(*given, without=without)
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1), done.stderr

@@ -1,4 +1,4 @@
-"""The person in the chair: skill profiles, warm-up and fatigue, slips of seven kinds, and where the time went."""
+"""The operator: skill profiles, warm-up and fatigue, slips of seven kinds, and the timesheet."""
 
 import dataclasses
 import json
@@ -67,7 +67,7 @@ def test_from_novice_to_first_order_everything_gets_better():
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "sentence"),
     [
         ({"observer": "expert"}, "observer: expected 'novice', 'trained', 'first-order' or a table, got \"expert\""),
         ({"observer.skill": "expert"}, "observer.skill: expected 'first-order' or 'novice' or 'trained'"),
@@ -79,10 +79,10 @@ def test_from_novice_to_first_order_everything_gets_better():
         ),
     ],
 )
-def test_mistakes_about_the_observer_are_named(overrides, said):
+def test_error_messages_name_mistakes_about_the_observer(overrides, sentence):
     with pytest.raises(ScenarioError) as error:
         load_scenario("akwanga", overrides)
-    assert said in str(error.value)
+    assert sentence in str(error.value)
 
 
 def test_the_schema_takes_the_word_and_the_table():
@@ -97,8 +97,8 @@ def test_the_command_line_knows_the_skills():
 
 
 @cache
-def crowd_of(skill):
-    """Twelve persons of a skill on film without errors, none of whom slips."""
+def batch_of(skill):
+    """Return a batch of twelve operators of a skill without slips, on film without errors."""
     scenario = read_once(one_model(observer_of_skill(skill, **WITHOUT_SLIPS), film=FilmDeformation()))
     batch = open_batch(scenario, range(12))
     (records,) = batch.measure_models()
@@ -107,19 +107,19 @@ def crowd_of(skill):
 
 @pytest.mark.slow
 def test_the_profiles_differ_in_residuals_in_centres_and_in_time():
-    found = {skill: crowd_of(skill) for skill in ("first-order", "trained", "novice")}
+    found = {skill: batch_of(skill) for skill in ("first-order", "trained", "novice")}
     for measure in (
-        lambda crowd, records: np.median(records.orientation.rms),
-        lambda crowd, records: np.median([records.centres[hand].rms for hand in (1, 2)]),
-        lambda crowd, records: np.median(crowd.workstation.operators.seconds),
+        lambda batch, records: np.median(records.orientation.rms),
+        lambda batch, records: np.median([records.centres[hand].rms for hand in (1, 2)]),
+        lambda batch, records: np.median(batch.workstation.operators.seconds),
     ):
         first, trained, novice = (measure(*each) for each in found.values())
         assert first < trained < novice
-    assert [crowd.workstation.operators.reasons for crowd, _ in found.values()] == [{}, {}, {}]
+    assert [batch.workstation.operators.reasons for batch, _ in found.values()] == [{}, {}, {}]
 
 
 @pytest.mark.slow
-def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
+def test_a_novice_in_a_batch_equals_the_novice_over_the_link():
     scenario, seeds = one_model(observer_of_skill("novice")), (4, 5)
     batch = open_batch(scenario, seeds)
     (records,) = batch.measure_models()
@@ -128,13 +128,13 @@ def test_a_novice_in_a_crowd_is_the_novice_at_the_line():
         session = open_session(scenario, seed)
         record = next(iter(measure_models(session.person, session.job)))
         assert record.orientation.elements == records.for_session(i).orientation.elements
-        assert [_told(slip) for slip in session.person.slips] == [
-            _told(slip) for slip in batch.workstation.operators.slip_log[i]
+        assert [_without_place(slip) for slip in session.person.slips] == [
+            _without_place(slip) for slip in batch.workstation.operators.slip_log[i]
         ]
         assert session.person.timesheet.acts_of(0) == batch.workstation.operators.timesheet.acts_of(i)
 
 
-def _told(slip):
+def _without_place(slip):
     return dataclasses.replace(slip, entry=0, round=0)
 
 
@@ -148,7 +148,7 @@ def test_warm_up_falls_evenly_to_nothing_and_fatigue_grows_once_no_longer_fresh(
     assert slip_factor(Observer(slip_fatigue_per_hour=0.5), since_rest) == pytest.approx([1.0, 1.0, 1.0, 1.5, 2.5])
 
 
-def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
+def test_settings_of_a_tired_operator_scatter_more_and_a_break_restores_the_scatter():
     """The same draws, larger by the factor of the hour; after a break as at the start."""
     tired = open_batch(
         one_model(Observer(fresh_hours=0.0, fatigue_per_hour=1.0, takes_breaks=True)), (1,)
@@ -165,7 +165,7 @@ def test_a_tired_persons_settings_scatter_more_and_a_break_restores_them():
     assert tired.timesheet.activities_of(0)["breaks"] == 900.0
 
 
-def test_breaks_are_taken_by_those_who_are_due_only():
+def test_only_operators_that_are_due_take_a_break():
     operators = open_batch(one_model(Observer(takes_breaks=True)), (1, 2)).workstation.operators
     operators.spend(operators.active[:1], 2.5 * HOUR)
     operators.begin(operators.active, "1", "relative orientation")
@@ -199,9 +199,9 @@ def test_pace_makes_everything_slower_but_breaks():
 
 @cache
 def planted(kind, **place):
-    """A person who slips once, for certain, and never else, and how the model ended.
+    """Return an operator with one certain slip, the record of the model and the reason of giving up.
 
-    Who forgets a lever reads parallaxes three times, others once.
+    With a forgotten lever parallaxes are read three times, otherwise once.
     """
     slip = PlannedSlip(kind=kind, model="1", **place)
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
@@ -278,7 +278,7 @@ LEVERS = {
 
 
 @pytest.mark.parametrize("lever", list(LEVERS))
-def test_a_forgotten_lever_is_found_by_what_the_eye_sees_and_put_right(lever):
+def test_a_forgotten_lever_is_detected_in_the_view_and_corrected(lever):
     """It costs some time, and the model comes out as without it."""
     person, record, _ = planted("forgotten lever", point=lever)
     (slip,) = person.slips
@@ -299,7 +299,7 @@ def test_a_forgotten_lever_is_found_by_what_the_eye_sees_and_put_right(lever):
         (("dove", "ycollar", "triangulation"), "numerical"),
     ],
 )
-def test_levers_whose_wrongs_make_a_right_are_all_found_in_the_end(levers, procedure):
+def test_wrong_levers_that_compensate_each_other_are_all_found(levers, procedure):
     """A mirrored picture and a wheel that turns the wrong way agree with each other, but not in both eyes."""
     slips = [PlannedSlip(kind="forgotten lever", point=lever) for lever in levers]
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=slips)
@@ -329,14 +329,14 @@ def test_a_planted_slip_happens_once_and_one_that_fits_nowhere_not_at_all():
     assert len(planted("transposed digits")[0].slips) == 1
 
 
-def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_path):
+def test_slips_are_in_the_results_and_in_no_entry_of_book_or_journal(tmp_path):
     slip = PlannedSlip(kind="transposed digits", form="model coordinates", point="C1")
     observer = msgspec.structs.replace(Observer(**WITHOUT_SLIPS), certain_slips=[slip])
     document = run(read_once(one_model(observer)), 1, RunOptions(tmp_path / "out"))
-    (told,) = document["truth"]["slips"]
-    assert (told["kind"], told["form"], told["point"]) == ("transposed digits", "model coordinates", "C1")
-    assert told["struck"]
-    assert json.loads((tmp_path / "out" / "results.json").read_text())["truth"]["slips"] == [told]
+    (slip,) = document["truth"]["slips"]
+    assert (slip["kind"], slip["form"], slip["point"]) == ("transposed digits", "model coordinates", "C1")
+    assert slip["struck"]
+    assert json.loads((tmp_path / "out" / "results.json").read_text())["truth"]["slips"] == [slip]
     for file in ("book.csv", "session.jsonl"):
         text = (tmp_path / "out" / file).read_text()
         assert not any(word in text for word in ("transposed", "slip", "planted"))
@@ -345,8 +345,8 @@ def test_slips_are_told_in_the_results_and_in_no_entry_of_book_or_journal(tmp_pa
     assert sum(document["operator"]["time_by_act_h"].values()) == pytest.approx(sum(hours.values()), abs=1e-3)
 
 
-def test_drawn_slips_come_as_often_as_their_rates_say():
-    """Of four persons who write a thousand readings of by each, with a rate of 5 % of either kind."""
+def test_the_frequency_of_drawn_slips_equals_their_rates():
+    """Four operators write a thousand readings of by each, with a rate of 5 % of either kind."""
     slipping = Observer(**WITHOUT_SLIPS | {"wrong_sign_rate": 0.05, "transposed_rate": 0.05})
     operators = open_batch(one_model(slipping), range(4)).workstation.operators
     active, nothing = operators.active, np.zeros(4)
@@ -358,7 +358,7 @@ def test_drawn_slips_come_as_often_as_their_rates_say():
     assert written == {"-3.12", "3.21"}
 
 
-def test_what_chance_misreads_is_told_too():
+def test_random_misreadings_are_logged_as_slips():
     session = open_session(one_model(Observer(blunder_rate=0.05)), 1)
     person = session.person
     next(iter(measure_models(person, session.job)))
@@ -368,7 +368,7 @@ def test_what_chance_misreads_is_told_too():
             assert person.book.entries[slip.entry - 1].reading == slip.written
 
 
-def test_transposed_digits_are_neighbours_and_nobody_writes_the_absurd():
+def test_transposed_digits_are_neighbours_and_plausible():
     assert transpositions(49.12) == [49.21]
     assert transpositions(-0.13) == [-0.31]
     assert transpositions(5047.36) == [5047.63]

@@ -1,4 +1,4 @@
-"""What photographs show: houses, edges as wide as a picture element, grain, and light that falls off."""
+"""Contents of photographs: houses, edges as wide as a picture element, grain, and light falloff."""
 
 import msgspec
 import numpy as np
@@ -147,8 +147,8 @@ def test_both_photographs_show_the_same_roofs_and_none_is_as_light_as_a_road(sce
     assert covered > 5
 
 
-def test_pictures_of_before_have_sharp_edges_and_nothing_but_ground_and_roads(scenario, scene, houses):
-    """Sessions of before are said again with theirs: no houses, no grain, light even, elements without width."""
+def test_pictures_of_old_sessions_have_sharp_edges_and_only_ground_and_roads(scenario, scene, houses):
+    """Old sessions are replayed with their pictures: no houses, no grain, light even, elements without width."""
     before = build_scene(scenario, 1, 1).photographs["101"].content
     plan = houses.middle[:, 7, None, None] + elements(25, 1.0)
     seen = on_film(scenario, scene, "101", plan.reshape(2, -1))
@@ -180,7 +180,7 @@ def test_grain_belongs_to_a_film_and_stays_where_it_is():
 
 
 def test_grain_is_a_few_greys_and_averages_out_in_large_elements():
-    """The spread of a mean over so many clumps falls with the side of the element."""
+    """The spread of a mean over many clumps decreases with the side of the element."""
     drawn = Emulsion(7, (1, 0))
     spread = {size: grain(drawn, size).std() for size in (0.015, 0.03, 0.06, 0.24)}
     assert 1.0 < 255.0 * spread[0.015] < 5.0

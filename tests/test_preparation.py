@@ -68,13 +68,13 @@ def test_a_flight_too_low_or_too_high_is_refused(flying_height):
 
 
 @pytest.mark.parametrize(
-    ("flying_height", "photo_base", "said"), [(1410.0, 91.0, "needs bx"), (1410.0, 60.0, "needs Y -354")]
+    ("flying_height", "photo_base", "reason"), [(1410.0, 91.0, "needs bx"), (1410.0, 60.0, "needs Y -354")]
 )
-def test_what_excludes_the_largest_model_is_named(flying_height, photo_base, said):
+def test_the_reason_that_excludes_the_largest_model_is_reported(flying_height, photo_base, reason):
     """At 1:3000 and 470 mm: a base of 91 mm becomes 280.1 mm, the corners of the picture lie 354 mm off the base."""
     flight = FlightPlan.of_heights(152.676, photo_base, (100.0, 110.0), flying_height=flying_height)
     largest = choose_settings(flight, A7).scales[0]
-    assert any(each.startswith(said) for each in largest.reason_rejected)
+    assert any(each.startswith(reason) for each in largest.reason_rejected)
 
 
 def test_a_map_without_a_horizontal_gear_is_refused():
@@ -94,7 +94,7 @@ def test_a_flight_needs_a_scale_or_a_height(given):
         FlightPlan.of_heights(152.676, 91.0, (430.24, 487.92), **given)
 
 
-def test_the_sheet_at_the_door():
+def test_the_command_prints_the_sheet():
     line = "prepare --c 152.676 --photo-scale 8000 --photo-base 91 --heights 430.24 487.92 --map-scale 2500"
     done = CliRunner().invoke(cli, line.split())
     assert done.exit_code == 0
@@ -104,7 +104,7 @@ def test_the_sheet_at_the_door():
 
 @pytest.mark.parametrize("option", ["--c", "--flying-height", "--photo-base", "--map-scale"])
 @pytest.mark.parametrize("value", ["0", "nan", "-1"])
-def test_what_is_not_above_zero_is_refused_with_one_sentence(typed, option, value):
+def test_a_value_not_above_zero_is_refused_with_one_sentence(typed, option, value):
     flight = {"--c": "152", "--flying-height": "1200", "--photo-base": "91", "--map-scale": "2500"} | {option: value}
     words = [word for pair in flight.items() for word in pair]
     code, _, err = typed("prepare", *words, "--heights", "400", "500")

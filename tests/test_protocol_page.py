@@ -1,4 +1,4 @@
-"""docs/protocol.md tells the truth: its tables are those of the instrument, its examples run (issue 5)."""
+"""docs/protocol.md: its tables equal those of the instrument, and its examples run (issue 5)."""
 
 import contextlib
 import importlib.util
@@ -35,7 +35,7 @@ def test_the_page_is_fresh(maker):
     assert maker.page(PAGES["docs/protocol.md"]) == PAGES["docs/protocol.md"], "run python docs/make_protocol.py"
 
 
-def test_every_example_of_the_page_is_obeyed(maker):
+def test_every_example_of_the_page_runs(maker):
     for command in maker.COMMANDS.commands:
         instrument = maker.Instrument("A8" if command.header.startswith("COMMon") else "A7")
         instrument.send(maker.PREPARATIONS.get(command.header, ""))
@@ -68,16 +68,16 @@ def urls():
 
 
 @pytest.mark.parametrize(("page", "code"), EXAMPLES, ids=[f"{name}-{i}" for i, (name, _) in enumerate(EXAMPLES)])
-def test_every_python_example_prints_what_it_says(urls, page, code, tmp_path, monkeypatch):
+def test_every_python_example_prints_the_shown_output(urls, page, code, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a7.tty").symlink_to(urls["pty"])
     here = code.replace("rfc2217://127.0.0.1:2217", urls["rfc2217"]).replace("5025", urls["tcp"].rpartition(":")[2])
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile(here, page, "exec"), {})
-    said = re.findall(r"print\(.*\)  # (.*)", code)
-    assert said
-    assert list(dict.fromkeys(printed.getvalue().splitlines())) == said
+    shown = re.findall(r"print\(.*\)  # (.*)", code)
+    assert shown
+    assert list(dict.fromkeys(printed.getvalue().splitlines())) == shown
 
 
 def test_no_example_is_left_out():

@@ -1,4 +1,4 @@
-"""Whoever stands between clients and an instrument and writes down what they say: `a7sim record`, in this process."""
+"""The recording proxy between clients and an instrument: `a7sim record`, in this process."""
 
 import socket
 import struct
@@ -16,21 +16,21 @@ AT_ONCE = struct.pack("ii", 1, 0)
 
 
 class Recorder:
-    """A Between that serves a door in a thread, what it heard, and why it ended."""
+    """A recording proxy that serves a socket in a thread, with its events and the error that ended it."""
 
-    def __init__(self, door):
-        self.port = door.getsockname()[1]
+    def __init__(self, listener):
+        self.port = listener.getsockname()[1]
         self.heard = []
         self.error = None
         self.stop = threading.Event()
         self._is_there = threading.Condition()
-        between_them = RecordingProxy("a7sim://akwanga", self._listen, WallClock(), self.stop)
-        self.thread = threading.Thread(target=self._serve, args=(between_them, door))
+        proxy = RecordingProxy("a7sim://akwanga", self._listen, WallClock(), self.stop)
+        self.thread = threading.Thread(target=self._serve, args=(proxy, listener))
         self.thread.start()
 
-    def _serve(self, between_them, door):
+    def _serve(self, proxy, listener):
         try:
-            between_them.serve(door)
+            proxy.serve(listener)
         except A7SimError as error:
             self.error = str(error)
 
@@ -40,7 +40,7 @@ class Recorder:
             self._is_there.notify_all()
 
     def until(self, direction, text):
-        """Wait until it heard something."""
+        """Wait until the proxy records an event."""
         with self._is_there:
             assert self._is_there.wait_for(lambda: (direction, text) in self.heard, TIMEOUT_S), self.heard
 
@@ -50,8 +50,8 @@ class Recorder:
 
 @contextmanager
 def recording():
-    with socket.create_server(("127.0.0.1", 0)) as door:
-        recorder = Recorder(door)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        recorder = Recorder(listener)
         try:
             yield recorder
         finally:
@@ -60,8 +60,8 @@ def recording():
             assert not recorder.thread.is_alive()
 
 
-def test_what_says_nothing_is_passed_on_and_not_written_down_and_what_is_too_long_not_kept():
-    """A line without an end is let go piece by piece, so that nobody's memory grows, and is one line all the same."""
+def test_empty_input_is_passed_and_not_recorded_and_long_lines_are_not_stored():
+    """A line without an end is passed in pieces, so that memory does not grow, and is recorded as one line."""
     with recording() as recorder, recorder.client() as client:
         client.sendall(b"\n \r\n*OPC?\n" + b"x" * 5000)
         recorder.until("<", "1")
@@ -75,7 +75,7 @@ def test_what_says_nothing_is_passed_on_and_not_written_down_and_what_is_too_lon
     assert recorder.error is None
 
 
-def test_a_client_that_is_cut_off_is_written_down_as_gone_and_the_next_is_let_in():
+def test_a_reset_client_is_recorded_as_gone_and_the_next_is_accepted():
     with recording() as recorder:
         with recorder.client() as client:
             recorder.until("+", "")
@@ -107,7 +107,7 @@ class Broken:
         pass
 
 
-def test_a_line_to_the_instrument_that_breaks_ends_it_in_a_sentence(monkeypatch):
+def test_a_broken_line_to_the_instrument_ends_the_proxy_with_one_sentence(monkeypatch):
     monkeypatch.setattr(recording_proxy, "open_port", lambda *_: Broken())
     with recording() as recorder, recorder.client() as client:
         client.sendall(b"*OPC?\n")
@@ -115,7 +115,7 @@ def test_a_line_to_the_instrument_that_breaks_ends_it_in_a_sentence(monkeypatch)
         assert recorder.error == "a7sim://akwanga: the line to the instrument broke"
 
 
-def test_it_stops_with_a_client_still_there():
+def test_the_proxy_stops_while_a_client_is_connected():
     with recording() as recorder, recorder.client() as client:
         client.sendall(b"*OPC?\n")
         recorder.until("<", "1")

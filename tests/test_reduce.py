@@ -1,4 +1,4 @@
-"""`a7sim reduce` on real measurements, as files.md promises it."""
+"""`a7sim reduce` on real measurements, by files.md."""
 
 import json
 import tomllib
@@ -48,7 +48,7 @@ def strip_files(folder, data, number, swapped=False):
     return pairs, ground
 
 
-def test_the_published_pair_comes_out_to_its_digits(reference):
+def test_the_published_pair_is_computed_to_its_digits(reference):
     expected = toml(reference / "03_dewitt_public_domain.toml")["relative_orientation"]
     document = json.loads(
         reduce(
@@ -79,7 +79,7 @@ def test_the_published_pair_comes_out_to_its_digits(reference):
         np.testing.assert_allclose(place, given, atol=0.01)
 
 
-def test_another_published_pair_comes_out_to_its_digits(reference, tmp_path):
+def test_another_published_pair_is_computed_to_its_digits(reference, tmp_path):
     expected = toml(reference / "02_calgary_lab_pair_27_28.toml")
     path = pair_file(tmp_path / "pair.csv", expected["relative_a"]["points"])
     document = processing.relative(path, expected["c_mm"], (0.0, 0.0), "dependent", expected["bx_mm"]).document
@@ -117,7 +117,7 @@ def test_north_and_east_swapped_give_the_warning(reference, tmp_path):
     assert "left-handed" in " ".join(done.stdout.split())
 
 
-def test_the_published_similarity_comes_out_to_its_digits(reference, tmp_path):
+def test_the_published_similarity_is_computed_to_its_digits(reference, tmp_path):
     expected = toml(reference / "03_dewitt_public_domain.toml")["similarity"]
     rows = [",".join(str(p[k]) for k in ("id", "x", "y", "z", "X", "Y", "Z")) for p in expected["common"]]
     path = tmp_path / "common.csv"
@@ -158,7 +158,7 @@ def test_a_centre_comes_from_pointings_at_two_levels(tmp_path):
         ("point,xl,yl,xr,yr\n" + "".join(f"{i},{10 * i},0,{10 * i - 90},0\n" for i in range(8)), ["condition number"]),
     ],
 )
-def test_a_bad_pair_file_is_one_sentence_with_its_place(tmp_path, content, words):
+def test_the_error_message_of_a_bad_pair_file_is_one_sentence_with_its_place(tmp_path, content, words):
     path = tmp_path / "bad.csv"
     path.write_text(content, encoding="utf-8")
     done = reduce("relative", path, "--c", 152)

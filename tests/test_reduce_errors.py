@@ -1,4 +1,4 @@
-"""Files that cannot be used: every command answers in one sentence with the place, and exit code 2."""
+"""Unusable files: every command prints one sentence with the place and ends with exit code 2."""
 
 import subprocess
 import sys
@@ -124,8 +124,8 @@ FAULTS = [
 
 
 @pytest.fixture
-def said(tmp_path, monkeypatch, capsys):
-    """Run a command in a folder with good ground and camera files; return the exit code and what was said."""
+def run_reduce(tmp_path, monkeypatch, capsys):
+    """Run a command in a folder with good ground and camera files; return the exit code and the message."""
     (tmp_path / "ground.csv").write_text(GROUND, encoding="utf-8")
     (tmp_path / "camera.toml").write_text(CAMERA, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
@@ -163,25 +163,25 @@ ENOUGH_FOR_AN_A8 = (too_few,)
         if command != "centres a8" or fault not in ENOUGH_FOR_AN_A8
     ],
 )
-def test_a_bad_file_is_one_sentence_with_its_place(said, tmp_path, command, fault):
+def test_the_error_message_of_a_bad_file_is_one_sentence_with_its_place(run_reduce, tmp_path, command, fault):
     options, header, row = COMMANDS[command]
     content, words = fault(header.split(","), row)
     path = tmp_path / ("bad.toml" if fault.__name__.startswith("toml") else "bad.csv")
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    one_sentence(said(command.split()[0], path.name, *options), path.name, *words)
+    one_sentence(run_reduce(command.split()[0], path.name, *options), path.name, *words)
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_folders_long_files_and_files_that_are_not_there_are_refused(said, tmp_path, command):
+def test_folders_long_files_and_missing_files_are_refused(run_reduce, tmp_path, command):
     options, _, _ = COMMANDS[command]
     command = command.split()[0]
     (tmp_path / "folder").mkdir()
-    one_sentence(said(command, "folder", *options), "expected a file, got the folder 'folder'")
-    one_sentence(said(command, "none.csv", *options), "none.csv", "No such file")
+    one_sentence(run_reduce(command, "folder", *options), "expected a file, got the folder 'folder'")
+    one_sentence(run_reduce(command, "none.csv", *options), "none.csv", "No such file")
     with (tmp_path / "noise.csv").open("wb") as file:
         file.truncate(100_000_000)
-    one_sentence(said(command, "noise.csv", *options), "noise.csv", "at most")
-    one_sentence(said(command, "/dev/zero", *options), "at most")
+    one_sentence(run_reduce(command, "noise.csv", *options), "noise.csv", "at most")
+    one_sentence(run_reduce(command, "/dev/zero", *options), "at most")
 
 
 @pytest.mark.parametrize("command", [name for name, (options, _, _) in COMMANDS.items() if "--ground" in options])
@@ -196,11 +196,11 @@ def test_folders_long_files_and_files_that_are_not_there_are_refused(said, tmp_p
         ("", ["empty file"]),
     ],
 )
-def test_bad_ground_is_named_by_line_and_column(said, tmp_path, command, content, words):
+def test_the_error_message_names_line_and_column_of_bad_ground(run_reduce, tmp_path, command, content, words):
     options, header, row = COMMANDS[command]
     (tmp_path / "good.csv").write_text(f"{header}\n{','.join(row)}\n", encoding="utf-8")
     (tmp_path / "ground.csv").write_text(content, encoding="utf-8")
-    one_sentence(said(command.split()[0], "good.csv", *options), "ground.csv", *words)
+    one_sentence(run_reduce(command.split()[0], "good.csv", *options), "ground.csv", *words)
 
 
 DECK = """\
@@ -213,11 +213,11 @@ DECK = """\
 
 
 @pytest.mark.parametrize("command", ["strip", "connect"])
-def test_a_card_one_column_off_is_named_by_its_columns(said, tmp_path, command):
+def test_the_error_message_names_the_columns_of_a_shifted_card(run_reduce, tmp_path, command):
     (tmp_path / "deck").write_text(DECK.replace("   1  101", "  1  101"), encoding="utf-8")
-    one_sentence(said(command, "deck"), "deck, line 4, columns 1-4")
+    one_sentence(run_reduce(command, "deck"), "deck, line 4, columns 1-4")
     (tmp_path / "deck.crd").write_text("model,point\n", encoding="utf-8")
-    one_sentence(said(command, "deck.crd"), "deck.crd, line 1, column")
+    one_sentence(run_reduce(command, "deck.crd"), "deck.crd, line 1, column")
 
 
 @pytest.mark.parametrize(
@@ -229,18 +229,18 @@ def test_a_card_one_column_off_is_named_by_its_columns(said, tmp_path, command):
     ids=["on a line", "in one place"],
 )
 @pytest.mark.parametrize("method", ["coplanarity", "parallax", "schut", "robust", "all"])
-def test_a_degenerate_pair_is_refused_with_the_condition_number(said, tmp_path, points, method):
+def test_a_degenerate_pair_is_refused_with_the_condition_number(run_reduce, tmp_path, points, method):
     rows = [f"{i},{x},{y},{x - 90},{y}" for i, (x, y) in enumerate(points)]
     (tmp_path / "pair.csv").write_text("point,xl,yl,xr,yr\n" + "\n".join(rows) + "\n", encoding="utf-8")
-    answer = said("relative", "pair.csv", "--c", 152, "--method", method)
+    answer = run_reduce("relative", "pair.csv", "--c", 152, "--method", method)
     one_sentence(answer, "pair.csv", "condition number")
 
 
-def test_an_out_folder_that_is_a_file_is_refused_and_nothing_is_left_behind(said, tmp_path):
+def test_an_out_folder_that_is_a_file_is_refused_and_nothing_is_left_behind(run_reduce, tmp_path):
     (tmp_path / "a8.csv").write_text("model,base,column,height\n1,180,420,15\n", encoding="utf-8")
-    one_sentence(said("centres", "a8.csv", "--method", "a8", "--out", "camera.toml"), "camera.toml", "folder")
+    one_sentence(run_reduce("centres", "a8.csv", "--method", "a8", "--out", "camera.toml"), "camera.toml", "folder")
     (tmp_path / "o" / "results.json").mkdir(parents=True)
-    one_sentence(said("centres", "a8.csv", "--method", "a8", "--out", "o"), "o: expected a folder")
+    one_sentence(run_reduce("centres", "a8.csv", "--method", "a8", "--out", "o"), "o: expected a folder")
     assert sorted(each.name for each in (tmp_path / "o").iterdir()) == ["points.csv", "results.json"]
 
 
@@ -284,8 +284,8 @@ MODELS = "model,point,X,Y,Z\n1,5,0,1,2\n2,5,0,1,2\n"
         ),
     ],
 )
-def test_what_a_strip_lacks_is_said_with_the_file(said, tmp_path, words, sentence):
+def test_the_error_message_names_the_file_and_the_missing_part_of_a_strip(run_reduce, tmp_path, words, sentence):
     turned = PAIRS.replace("xl,yl,xr,yr", "xr,yr,xl,yl")
     for name, text in (("models.csv", MODELS), ("pairs.csv", PAIRS), ("turned.csv", turned)):
         (tmp_path / name).write_text(text, encoding="utf-8")
-    one_sentence(said(*words), words[1], sentence)
+    one_sentence(run_reduce(*words), words[1], sentence)

@@ -27,7 +27,7 @@ def counts_file(path, rows):
 CORNERS = [("1", -106.0, -106.0), ("2", 106.0, 106.0), ("3", -106.0, 106.0), ("4", 106.0, -106.0)]
 
 
-def test_a_published_interior_orientation_comes_out_to_its_digits(reference, tmp_path):
+def test_a_published_interior_orientation_is_computed_to_its_digits(reference, tmp_path):
     data = toml(reference / "12_noobeed_interior.toml")
     marks = [(f["id"], f["x_mm"], f["y_mm"]) for f in data["fiducials"]]
     counts = counts_file(tmp_path / "counts.csv", [("1", f["id"], f["col"], f["row"]) for f in data["fiducials"]])
@@ -95,7 +95,7 @@ def test_lens_and_refraction_are_taken_off_and_pairs_are_written(tmp_path):
         processing.interior(path, camera, corrections=("curvature",))
 
 
-def test_confused_and_missing_fiducials_and_bad_cameras_are_named(tmp_path):
+def test_error_messages_name_confused_and_missing_fiducials_and_bad_cameras(tmp_path):
     camera = camera_file(tmp_path / "camera.toml", CORNERS)
     swapped = [("7", name, x, y) for name, (_, x, y) in zip("1324", CORNERS, strict=True)]
     with pytest.raises(A7SimError, match="photo 7: expected counts of the fiducials that lie as in the camera"):
@@ -169,7 +169,7 @@ def test_all_methods_stand_side_by_side(tmp_path):
         processing.relative(path, 152.0, (0.0, 0.0), "independent", 92.0, "all")
 
 
-def test_both_similarities_agree_and_say_so(reference, tmp_path):
+def test_both_similarities_agree_and_report_it(reference, tmp_path):
     common = toml(reference / "03_dewitt_public_domain.toml")["similarity"]["common"]
     path = tmp_path / "common.csv"
     rows = [",".join(str(p[k]) for k in ("id", "x", "y", "z", "X", "Y", "Z")) for p in common]

@@ -146,7 +146,7 @@ def test_the_order_of_cards_changes_nothing(tmp_path_factory, seed):
 
 @examples(10)
 @given(st.integers(0, 2**32 - 1))
-def test_a_strip_without_errors_comes_back_exactly(tmp_path_factory, seed):
+def test_a_strip_without_errors_is_recovered_exactly(tmp_path_factory, seed):
     models, ground = flat_strip(np.random.default_rng(seed), 4)
     folder = tmp_path_factory.mktemp("exact")
     document = processing.strip(models_file(folder / "m.csv", models), ground_file(folder / "g.csv", ground)).document
@@ -238,7 +238,7 @@ def test_a_strip_comes_through_a_pipe(tmp_path, kind):
     assert json.loads(done.stdout)["input"] == kind
 
 
-def test_what_no_card_can_hold_is_said_and_the_rest_is_written(tmp_path):
+def test_values_too_long_for_a_card_are_reported_and_the_others_written(tmp_path):
     models, ground = flat_strip(np.random.default_rng(3), 3)
     long = Ground(ground.points, ground.coordinates + np.array([[446000.0], [4505000.0], [0.0]]), ground.roles)
     path, known = models_file(tmp_path / "m.csv", models), ground_file(tmp_path / "g.csv", long)
@@ -308,7 +308,7 @@ def test_one_model_goes_to_the_ground_with_plan_and_height_control_only(tmp_path
     assert document["statistics"]["redundancy"] == 1
 
 
-def test_a_block_of_two_strips_comes_back_exactly(tmp_path):
+def test_a_block_of_two_strips_is_recovered_exactly(tmp_path):
     first, ground = flat_strip(np.random.default_rng(8), 4)
     second, _ = flat_strip(np.random.default_rng(8), 4)
     renamed = [

@@ -1,4 +1,4 @@
-"""What `a7sim reduce` prints without --json: every number of the document that --json gives for the same file."""
+"""Tables of `a7sim reduce` without --json: every number of the document that --json prints for the same file."""
 
 import json
 
@@ -68,7 +68,7 @@ def common():
 
 @pytest.fixture(autouse=True)
 def a_wide_terminal(monkeypatch):
-    """So that no cell is folded."""
+    """Prevent the folding of cells."""
     monkeypatch.setenv("COLUMNS", "200")
 
 
@@ -77,11 +77,11 @@ def shown(folder, kind, content, *words):
     file = folder / "points.csv"
     file.write_text(content, encoding="utf-8")
     (folder / "camera.toml").write_text(CAMERA, encoding="utf-8")
-    printed, said = (
+    printed, as_json = (
         a7sim_in_process("reduce", kind, "points.csv", *words, *also, cwd=folder) for also in ((), ("--json",))
     )
-    assert (printed.returncode, said.returncode) == (0, 0), printed.stderr + said.stderr
-    return json.loads(said.stdout), printed.stdout
+    assert (printed.returncode, as_json.returncode) == (0, 0), printed.stderr + as_json.stderr
+    return json.loads(as_json.stdout), printed.stdout
 
 
 def lines(text):
@@ -132,7 +132,7 @@ def test_relative_orientation_by_every_method_stands_side_by_side(tmp_path):
     assert "largest difference: " in printed
 
 
-def test_six_points_are_too_few_to_name_a_blunder_and_it_is_said(tmp_path):
+def test_six_points_are_too_few_to_name_a_blunder_and_this_is_reported(tmp_path):
     six = "\n".join(pair().splitlines()[:7]) + "\n"
     document, printed = shown(tmp_path, "relative", six, "--c", "152", "--method", "robust")
     assert not document["searchable"]

@@ -1,4 +1,4 @@
-"""The computing room: published oracles and exact recovery."""
+"""The reductions: published oracles and exact recovery."""
 
 import csv
 import re
@@ -39,7 +39,7 @@ def pointings_towards(centre, noise=0.0, rng=None):
     )
 
 
-def test_the_theses_printed_centres_come_back_from_pointings_that_fit_them(reference):
+def test_the_printed_centres_of_the_thesis_are_recovered_from_pointings_that_fit(reference):
     for _, printed in printed_centres(reference):
         found = perspective_centre(*pointings_towards((printed["X0"], printed["Y0"], printed["Z0"])), *LEVELS)
         assert float(found.X0) == pytest.approx(printed["X0"], abs=1e-6)
@@ -159,7 +159,7 @@ def test_four_points_do_not_orient():
 
 
 @given(st.integers(0, 10_000))
-def test_least_squares_is_numpys_and_a_batch_is_its_members(seed):
+def test_least_squares_equals_numpy_and_a_batch_equals_its_members(seed):
     rng = np.random.default_rng(seed)
     design, observed = rng.standard_normal((9, 4, 3)), rng.standard_normal((9, 3))
     together = solve_least_squares(design, observed)
@@ -186,7 +186,7 @@ def test_weights_count_as_repeated_observations():
 
 
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-1e-3, 1e-3), st.floats(-1e-3, 1e-3))
-def test_a_pictures_lie_comes_back_from_its_fiducials(dx, dy, turn, scale):
+def test_the_placement_of_a_picture_is_recovered_from_its_fiducials(dx, dy, turn, scale):
     marks = np.array([(-106.0, -106.0), (106.0, 106.0), (-106.0, 106.0), (106.0, -106.0)]).T
     x, y = marks
     displaced = np.array([dx - turn * y + scale * x, dy + turn * x + scale * y])
