@@ -49,7 +49,7 @@ def test_undeformed_film_holds_the_exact_images_about_the_principal_point():
         np.testing.assert_allclose(marks.xy, exact + np.array(scenario.camera.principal_point)[:, None], atol=1e-9)
 
 
-def test_the_standard_points_lie_as_in_figure_4_1():
+def test_the_standard_points_are_those_of_figure_4_1():
     scenario = akwanga(film=FAULTLESS_FILM)
     scene = build_scene(scenario, 1)
     left = scene.photographs["101"].points

@@ -73,7 +73,7 @@ def test_cells_without_a_number_are_excluded_and_too_few_cells_have_no_main_effe
     assert main_effects(np.ones(50), {"u": u}) == []
 
 
-def test_the_share_of_chance_is_of_few_replicates_and_common_random_numbers_add_none():
+def test_chance_is_the_scatter_of_means_of_few_replicates_without_common_random_numbers():
     rng = np.random.default_rng(2)
     cells, common = np.linspace(0.0, 1.0, 400)[:, None], 50.0 * rng.standard_normal(10)
     values = cells + common + 0.5 * rng.standard_normal((400, 10))
