@@ -1,4 +1,4 @@
-"""Relative orientation from image coordinates: published results, exact recovery, four methods, refusals."""
+"""Relative orientation from image coordinates: published results, exact recovery, four methods, errors."""
 
 import tomllib
 
@@ -31,7 +31,7 @@ def pairs_of(rng, tilt_deg, plan=SIX, noise=0.0, batch=(), relief=0.1, together=
     if together:
         direction = rng.uniform(0.0, 2.0 * np.pi, batch)
         angles[1, :2] = np.array([np.cos(direction), np.sin(direction)]) * np.abs(angles[1, 0])
-    angles[0, 0] = 0.0  # that is where the frame stands about the base
+    angles[0, 0] = 0.0  # position of the frame about the base
     n = plan.shape[1]
     z = -C * (1.0 + rng.uniform(-relief, relief, (1, n, *batch)))
     points = np.concatenate([np.broadcast_to(BASE * plan.reshape((2, n, *(1,) * len(batch))), (2, n, *batch)), z])
@@ -56,8 +56,8 @@ def loaded(reference, name):
 # Published oracles
 
 
-def test_calgarys_first_pair_comes_back_to_the_printed_digits(reference):
-    """Lab report: by, bz, omega, phi, kappa, y-parallaxes (there right minus left) and model, from equal weights."""
+def test_calgarys_first_pair_is_reproduced_to_the_printed_digits(reference):
+    """Reproduce by, bz, omega, phi, kappa, y-parallaxes (there right minus left) and model of the lab report."""
     data = loaded(reference, "02_calgary_lab_pair_27_28.toml")
     pair, c, bx = data["relative_a"], data["c_mm"], data["bx_mm"]
     images = images_in(pair["points"])
@@ -75,7 +75,7 @@ def test_calgarys_first_pair_comes_back_to_the_printed_digits(reference):
     np.testing.assert_allclose(-parallaxes, pair["expected_y_parallax_mm"], atol=6e-4)
 
 
-def test_calgarys_second_pair_comes_back(reference):
+def test_calgarys_second_pair_is_reproduced(reference):
     data = loaded(reference, "02_calgary_lab_pair_27_28.toml")
     by, bz, omega, phi, kappa = data["relative_b"]["expected"]
     images = images_in(data["relative_b"]["points"])
@@ -86,7 +86,7 @@ def test_calgarys_second_pair_comes_back(reference):
     np.testing.assert_allclose(found.adjustment.unknowns[3:], (by, bz), atol=1e-4)
 
 
-def test_dewitts_program_comes_back_with_its_standard_deviations(reference):
+def test_results_of_dewitts_program_are_reproduced_with_their_standard_deviations(reference):
     data = loaded(reference, "03_dewitt_public_domain.toml")["relative_orientation"]
     images, c = images_in(data["points"]), data["c_mm"]
     bx, by, bz = data["expected_base_mm"]
@@ -162,7 +162,7 @@ def test_hallerts_closed_forms_are_the_least_squares_solution(parallaxes, b, d):
 
 @settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([6, 9, 15]), st.floats(0.0, 20.0))
-def test_any_pair_without_errors_comes_back(seed, n, tilt):
+def test_any_pair_without_errors_is_recovered(seed, n, tilt):
     images = pairs_of(np.random.default_rng(seed), tilt, {6: SIX, 9: NINE, 15: FIFTEEN}[n])
     image1, image2, expected, base, angles = images
     found = relative_orientation(image1, image2, C, C, bx=BASE)
@@ -175,8 +175,8 @@ def test_any_pair_without_errors_comes_back(seed, n, tilt):
 
 @pytest.mark.parametrize(("tilt", "iterations"), [(5.0, 3), (20.0, 5)])
 @pytest.mark.parametrize("plan", [SIX, NINE, FIFTEEN])
-def test_a_thousand_pairs_converge_as_paper_p_says(tilt, iterations, plan):
-    """P: tilts to 5 deg in three iterations, 20 deg in five, here to 1e-10 rad and from zero."""
+def test_a_thousand_pairs_converge_in_the_iterations_of_paper_p(tilt, iterations, plan):
+    """Paper P has three iterations for tilts to 5 deg and five for 20 deg; here from zero to 1e-10 rad."""
     image1, image2, expected, base, angles = pairs_of(
         np.random.default_rng(1968), tilt, plan, batch=(1000,), together=True
     )
@@ -189,7 +189,7 @@ def test_a_thousand_pairs_converge_as_paper_p_says(tilt, iterations, plan):
 
 
 @pytest.mark.parametrize("plan", [SIX, NINE, FIFTEEN])
-def test_twenty_degrees_in_every_angle_at_once_are_oriented_too(plan):
+def test_a_pair_with_twenty_degrees_in_every_angle_is_oriented(plan):
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(1969), 20.0, plan, batch=(5000,))
     found = relative_poses(image1, image2, C, C)
     assert found.converged.all()
@@ -198,7 +198,7 @@ def test_twenty_degrees_in_every_angle_at_once_are_oriented_too(plan):
 
 
 @pytest.mark.parametrize(("tilt", "iterations"), [(5.0, 3), (20.0, 5)])
-def test_errors_of_measurement_do_not_slow_it(tilt, iterations):
+def test_errors_of_measurement_add_no_iteration(tilt, iterations):
     image1, image2, *_ = pairs_of(np.random.default_rng(7), tilt, NINE, noise=0.005, batch=(1000,), together=True)
     found = relative_poses(image1, image2, C, C)
     assert found.converged.all()
@@ -274,7 +274,7 @@ def test_the_order_of_points_does_not_matter(method):
 
 
 @pytest.mark.parametrize("method", [relative_orientation, orientation_by_schut, orientation_by_parallaxes])
-def test_a_batch_is_its_members(method):
+def test_a_batch_gives_the_results_of_its_members(method):
     image1, image2, *_ = pairs_of(np.random.default_rng(2), 6.0, NINE, noise=0.005, batch=(3, 2))
     together = method(image1, image2, C, C)
     for at in np.ndindex(3, 2):
@@ -292,8 +292,8 @@ def test_a_batch_is_its_members(method):
     np.testing.assert_allclose(parallaxes[..., 1, 1], one[1], atol=1e-12)
 
 
-def test_pairs_from_near_and_from_far_in_one_batch_are_its_members():
-    """Those from near are worked together, the others after them, in sets; nobody can tell from what comes out."""
+def test_near_and_far_start_values_in_one_batch_give_the_results_of_its_members():
+    """Pairs near zero are solved together, the others after them in sets; the results do not depend on it."""
     near, far = (
         pairs_of(np.random.default_rng(seed), tilt, SIX, noise=0.005, batch=(3000,))
         for seed, tilt in ((11, 1.0), (12, 15.0))
@@ -311,7 +311,7 @@ def test_pairs_from_near_and_from_far_in_one_batch_are_its_members():
 
 @pytest.mark.parametrize("over", [1.0, -1.0])
 @pytest.mark.parametrize("reversed_", [1.0, -1.0])
-def test_of_four_poses_with_coplanar_rays_the_one_with_the_points_before_both_cameras_is_taken(over, reversed_):
+def test_of_four_poses_with_coplanar_rays_the_one_with_points_before_both_cameras_is_selected(over, reversed_):
     points = np.concatenate([BASE * NINE, np.full((1, 9), -C)])
     rays = np.array([points, points - np.array([BASE, 0.0, 0.0])[:, None]])
     true = np.array([np.eye(3), np.eye(3)])
@@ -323,7 +323,7 @@ def test_of_four_poses_with_coplanar_rays_the_one_with_the_points_before_both_ca
     assert before_both
 
 
-def test_photographs_turned_in_their_plane_are_oriented_too():
+def test_photographs_rotated_in_their_plane_are_oriented():
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(4), 3.0, NINE)
     for quarters in range(4):
         turn = rotation(0.0, 0.0, quarters * np.pi / 2.0)
@@ -331,7 +331,7 @@ def test_photographs_turned_in_their_plane_are_oriented_too():
         assert float(turn_of(mxm(transposed(found.rotation), mxm(turn, expected)))) < 1e-9
 
 
-def test_two_principal_distances_are_two():
+def test_photographs_may_have_different_principal_distances():
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(4), 3.0, NINE)
     found = relative_orientation(image1 * 2.0, image2, 2.0 * C, C)
     assert float(turn_of(mxm(transposed(found.rotation), expected))) < 1e-9
@@ -358,7 +358,7 @@ def test_a8_readings_become_model_coordinates():
     np.testing.assert_allclose(higher, [[80.0], [-100.0], [-287.5]])
 
 
-# Refusals
+# Errors
 
 
 def test_four_points_do_not_orient_a_pair():
@@ -377,7 +377,7 @@ def _vertical_images(points, noise):
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.005])
-def test_points_on_a_line_are_refused_with_the_condition_number(noise):
+def test_points_on_a_line_are_rejected_with_the_condition_number(noise):
     along = np.linspace(0.0, BASE, 9)
     for rise in (0.0, 0.3):
         images = _vertical_images(np.array([along, rise * along, np.full(9, -C)]), noise)
@@ -389,8 +389,8 @@ def test_points_on_a_line_are_refused_with_the_condition_number(noise):
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.005])
-def test_points_on_a_critical_cylinder_are_refused_with_the_condition_number(noise):
-    """A circular cylinder that holds both centres, its axis along the base: a valley flown along."""
+def test_points_on_a_critical_cylinder_are_rejected_with_the_condition_number(noise):
+    """The circular cylinder contains both centres and its axis is along the base: a flight along a valley."""
     around, along = (each.ravel() for each in np.meshgrid(np.linspace(-1.0, 1.0, 5), (0.0, 0.5, 1.0)))
     points = np.array([BASE * along, C / 2.0 * np.sin(around), -C / 2.0 * (1.0 + np.cos(around))])
     images = _vertical_images(points, noise)
@@ -399,7 +399,7 @@ def test_points_on_a_critical_cylinder_are_refused_with_the_condition_number(noi
             method(*images, C, C)
 
 
-def test_one_pair_that_cannot_be_oriented_does_not_spoil_the_batch():
+def test_one_pair_that_cannot_be_oriented_does_not_affect_the_batch():
     image1, image2, *_ = pairs_of(np.random.default_rng(8), 3.0, NINE, batch=(5,))
     image1[:, :, 2] = image1[:, :1, 2]
     found = relative_poses(image1, image2, C, C)
@@ -409,7 +409,7 @@ def test_one_pair_that_cannot_be_oriented_does_not_spoil_the_batch():
 
 
 def test_a_pair_without_measurements_changes_no_step_of_the_others():
-    """Where a pair's rays are no numbers, pairs far from zero still take steps no longer than any alone."""
+    """If the rays of one pair are NaN, the steps of pairs far from zero are limited as in a batch of one."""
     image1, image2, *_ = pairs_of(np.random.default_rng(3), 40.0, NINE, batch=(40,))
     alone = relative_poses(image1, image2, C, C)
     nothing = np.full_like(image1[..., :1], np.nan)
@@ -418,7 +418,7 @@ def test_a_pair_without_measurements_changes_no_step_of_the_others():
     np.testing.assert_array_equal(beside.iterations[:-1], alone.iterations)
 
 
-def test_five_points_orient_without_any_control():
+def test_five_points_orient_a_pair_without_redundancy():
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(1), 2.0, NINE[:, [0, 2, 3, 5, 6]])
     found = relative_orientation(image1, image2, C, C)
     assert float(turn_of(mxm(transposed(found.rotation), expected))) < 1e-9
@@ -431,7 +431,7 @@ def test_five_points_orient_without_any_control():
 
 @pytest.mark.parametrize("sigma", [0.005, None])
 @pytest.mark.parametrize("blunder", [0.15, -1.0])
-def test_the_point_with_the_blunder_is_named_and_left_out(sigma, blunder):
+def test_the_point_with_the_blunder_is_named_and_excluded(sigma, blunder):
     image1, image2, expected, *_ = pairs_of(np.random.default_rng(31), 3.0, FIFTEEN, noise=0.003)
     image2[1, 7] += blunder
     names = [f"P{i}" for i in range(15)]
@@ -451,7 +451,7 @@ def test_two_blunders_are_named_one_after_the_other():
     assert {each.point for each in found.blunders} == {"3", "12"}
 
 
-def test_sound_observations_are_left_alone():
+def test_no_sound_observation_is_excluded():
     for seed in range(20):
         image1, image2, *_ = pairs_of(np.random.default_rng(seed), 3.0, NINE, noise=0.004)
         found = snooped_orientation(image1, image2, C, C)
@@ -459,7 +459,7 @@ def test_sound_observations_are_left_alone():
         assert not found.blunders
 
 
-def test_six_points_cannot_tell_which_one_is_wrong():
+def test_six_points_cannot_identify_the_wrong_one():
     image1, image2, *_ = pairs_of(np.random.default_rng(2), 3.0, SIX)
     image2[1, 3] += 0.2
     found = snooped_orientation(image1, image2, C, C, sigma=0.005)

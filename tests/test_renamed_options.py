@@ -1,4 +1,4 @@
-"""Old names of options and commands work for one release, warn and are not shown (issue 19)."""
+"""Old names of options and commands are accepted for one release, warn and are not shown (issue 19)."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The report of a session: one page that needs nothing beside it and says what the results say."""
+"""The report of a session: one self-contained page with the numbers of the results."""
 
 import base64
 import json
@@ -33,14 +33,14 @@ def page(text):
 
 
 def changed(folder, results, tmp_path):
-    """A copy of a session's folder with other results."""
+    """Copy the folder of a session with other results."""
     copy = tmp_path / "copy"
     shutil.copytree(folder, copy)
     (copy / "results.json").write_text(json.dumps(results), encoding="utf-8")
     return copy
 
 
-def test_a_report_is_written_into_the_folder_or_where_it_is_asked_for(gave_up_folder, tmp_path, typed):
+def test_a_report_is_written_into_the_folder_or_to_the_path_given(gave_up_folder, tmp_path, typed):
     copy = tmp_path / "session"
     shutil.copytree(gave_up_folder, copy)
     code, printed, _ = typed("report", copy)
@@ -51,7 +51,7 @@ def test_a_report_is_written_into_the_folder_or_where_it_is_asked_for(gave_up_fo
     assert not (gave_up_folder / "report.html").exists()
 
 
-def test_a_report_goes_with_the_session_that_is_written_over(gave_up_folder, tmp_path, typed):
+def test_a_report_is_deleted_with_the_session_that_is_overwritten(gave_up_folder, tmp_path, typed):
     copy = tmp_path / "session"
     shutil.copytree(gave_up_folder, copy)
     assert typed("report", copy)[0] == 0
@@ -71,7 +71,7 @@ def test_a_report_can_be_shown_in_the_browser(gave_up_folder, tmp_path, typed, m
     assert shown == [(tmp_path / "r.html").as_uri()]
 
 
-def test_nothing_on_the_page_comes_from_elsewhere(text, page):
+def test_the_page_loads_nothing_from_outside(text, page):
     assert not re.search(r"https?:|//[a-z]|@import|url\((?!#)", text)
     for tag, attributes in page.elements:
         assert tag not in ("script", "iframe", "object")
@@ -79,7 +79,7 @@ def test_nothing_on_the_page_comes_from_elsewhere(text, page):
             assert attributes.get(name, "#").startswith(("#", "data:"))
 
 
-def test_every_name_on_the_page_is_there_once_and_every_reference_leads_somewhere(text, page):
+def test_every_id_on_the_page_is_unique_and_every_reference_has_a_target(text, page):
     assert len(set(page.ids)) == len(page.ids)
     wanted = {attributes["href"][1:] for _, attributes in page.elements if attributes.get("href", "").startswith("#")}
     wanted |= set(re.findall(r"url\(#([^)]*)\)", text))
@@ -105,8 +105,8 @@ def test_every_table_has_a_caption_and_headers_with_their_scope(page):
         assert {len(row) for row in table.rows} == {len(table.columns)}
 
 
-def test_figures_take_the_colours_of_the_page(text):
-    """None but the page's own colours are drawn, so that figures stay legible in the dark and in print."""
+def test_figures_use_the_colours_of_the_page(text):
+    """Figures contain no other colours, so that they stay legible in dark mode and in print."""
     drawn = "".join(re.findall(r"<svg.*?</svg>", text, flags=re.DOTALL))
     assert not re.search(r"#[0-9a-fA-F]{6}\b", drawn)
     used = set(re.findall(r"var\((--\w+)\)", drawn))
@@ -114,7 +114,7 @@ def test_figures_take_the_colours_of_the_page(text):
         assert used <= set(re.findall(r"(--\w+):", scheme))
 
 
-def test_residual_parallaxes_are_those_of_the_results(page, results):
+def test_residual_parallaxes_equal_those_of_the_results(page, results):
     tables = [table for table in page.tables if table.caption == "Residual y-parallaxes"]
     for table, model in zip(tables, results["models"], strict=True):
         residuals = model["relative_orientation"]["residual_parallax_mm"]
@@ -122,7 +122,7 @@ def test_residual_parallaxes_are_those_of_the_results(page, results):
         assert {row[0]: row[1] for row in table.rows} == model["standard_points"]
 
 
-def test_centres_are_those_of_the_results(page, results):
+def test_centres_equal_those_of_the_results(page, results):
     tables = [table for table in page.tables if table.caption == "Perspective centres, counter units"]
     for table, model in zip(tables, results["models"], strict=True):
         left, right = (model["perspective_centres"][side] for side in ("left", "right"))
@@ -139,7 +139,7 @@ def test_a_prime_is_the_left_projector_also_with_base_out(page):
     assert "Model 2: perspective centre O″, left photograph 102" in text
 
 
-def test_residuals_on_the_ground_are_those_of_the_results(page, results):
+def test_residuals_on_the_ground_equal_those_of_the_results(page, results):
     table = page.table("Residuals, computed minus given, m")
     expected = results["strip"]["residuals_m"]
     assert [row[0] for row in table.rows] == list(expected)
@@ -148,19 +148,19 @@ def test_residuals_on_the_ground_are_those_of_the_results(page, results):
         assert xyz == [f"{expected[point][axis]:+.3f}" for axis in "XYZ"]
 
 
-def test_hours_are_those_of_the_results(page, results):
+def test_hours_equal_those_of_the_results(page, results):
     table = page.table("Hours by activity")
     assert {row[0]: float(row[1]) for row in table.rows} == results["operator"]["time_by_activity_h"]
 
 
-def test_the_page_says_what_gives_the_session_again(page, results):
+def test_the_page_contains_the_command_that_reproduces_the_session(page, results):
     table = page.table("What gives this session again")
     assert table.row("command line")[1] == results["command_line"] == "a7sim run akwanga --seed 7"
     assert table.row("seed")[1] == "7"
     assert table.row("software")[1] == results["software"]
 
 
-def test_a_request_is_told_with_what_it_changed(gave_up_folder):
+def test_a_changed_setting_is_reported_with_its_request(gave_up_folder):
     page = Page(render_report(read_session(gave_up_folder)))
     line = page.table("What gives this session again").row("command line")[1]
     assert line == "a7sim run akwanga --seed 1985 --set 'photos.1.laid=upside down' --skill novice"
@@ -168,14 +168,14 @@ def test_a_request_is_told_with_what_it_changed(gave_up_folder):
     assert changed == {"photos.1.laid": "upside down", "observer.skill": '"novice"'}
 
 
-def test_a_session_that_does_not_fit_says_so_and_shows_what_there_is(gave_up_folder):
+def test_the_report_of_a_session_that_does_not_fit_states_this_and_shows_the_existing_results(gave_up_folder):
     page = Page(render_report(read_session(gave_up_folder)))
     assert "does not fit: picture 102 lies upside down" in "".join(page.text)
     assert "Hours by activity" in [table.caption for table in page.tables]
     assert not [table for table in page.tables if "centres" in table.caption]
 
 
-def test_an_interrupted_session_shows_what_there_is(akwanga_folder, results, tmp_path):
+def test_the_report_of_an_interrupted_session_shows_the_existing_results(akwanga_folder, results, tmp_path):
     half = {key: value for key, value in results.items() if key != "strip"}
     half |= {"status": "interrupted", "message": "the session was interrupted", "models": results["models"][:1]}
     page = Page(render_report(read_session(changed(akwanga_folder, half, tmp_path))))
@@ -184,7 +184,7 @@ def test_an_interrupted_session_shows_what_there_is(akwanga_folder, results, tmp
 
 
 def test_rays_of_the_points_give_the_rms_of_the_centre(akwanga_folder, results):
-    """What the book says and what the results say of a centre is one thing, second sets and struck entries and all."""
+    """Book and results agree on a centre, with second sets and struck entries."""
     kept = read_session(akwanga_folder)
     for model in results["models"]:
         for side, found in model["perspective_centres"].items():
@@ -201,7 +201,7 @@ def test_rays_that_do_not_give_the_rms_of_the_results_are_not_drawn(akwanga_fold
     assert pointing_rays(read_session(akwanga_folder), other, "left") == {}
 
 
-def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_way(finished):
+def test_a_strip_by_comparator_and_readings_has_a_chapter_for_each_method(finished):
     page = Page(render_report(read_session(finished("a8-strip").folder)))
     text = "".join(page.text)
     for words in ("Strip, comparator", "Strip, A8", "A8 minus comparator"):
@@ -218,8 +218,8 @@ def test_a_grid_test_has_its_residuals_at_the_crosses(finished):
     assert page.table("What gives this session again").row("command line")[1].endswith("--points 9 --levels 1")
 
 
-def test_a_map_stands_on_the_page_as_a_picture_of_its_own(tmp_path, results):
-    """The styles of a map reach nothing else on the page: it is an image with its data, not a part of the page."""
+def test_a_map_is_embedded_in_the_page_as_an_image(tmp_path, results):
+    """The map is an image with its own data, so its styles do not apply to the rest of the page."""
     strip = results["strip"]
     line = {"name": "contour 460", "closed": True, "endings": [], "vertices": 9, "length_m": 80.0}
     document = {
@@ -245,7 +245,7 @@ def test_a_map_stands_on_the_page_as_a_picture_of_its_own(tmp_path, results):
 
 
 @pytest.mark.parametrize(
-    ("harm", "said"),
+    ("harm", "words"),
     [
         (shutil.rmtree, "expected the folder of a session, got none"),
         (lambda folder: (folder / "results.json").unlink(), "the session was cut off before its end"),
@@ -266,18 +266,20 @@ def test_a_map_stands_on_the_page_as_a_picture_of_its_own(tmp_path, results):
         (lambda folder: (folder / "book.csv").write_text("a,b\n1,2\n"), "expected the columns number,time_s"),
     ],
 )
-def test_a_folder_that_is_no_session_is_told_in_one_sentence(akwanga_folder, tmp_path, typed, harm, said):
+def test_the_error_message_for_a_folder_that_is_no_session_is_one_sentence(
+    akwanga_folder, tmp_path, typed, harm, words
+):
     folder = tmp_path / "harmed"
     shutil.copytree(akwanga_folder, folder)
     harm(folder)
     code, printed, complaint = typed("report", folder, "--out", tmp_path / "r.html")
     assert (code, printed) == (2, "")
-    assert said in complaint
+    assert words in complaint
     assert complaint.count("\n") == 1
     assert not (tmp_path / "r.html").exists()
 
 
-def test_without_matplotlib_a_report_says_what_to_install(akwanga_folder, tmp_path, typed, monkeypatch):
+def test_without_matplotlib_the_error_message_names_the_extra_to_install(akwanga_folder, tmp_path, typed, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     code, _, complaint = typed("report", akwanga_folder, "--out", tmp_path / "r.html")
     assert code == 2
@@ -285,7 +287,7 @@ def test_without_matplotlib_a_report_says_what_to_install(akwanga_folder, tmp_pa
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no chromium to open the page with")
-def test_a_browser_opens_the_page_without_an_error_and_asks_nobody(text, tmp_path):
+def test_a_browser_opens_the_page_without_an_error_or_a_request(text, tmp_path):
     (tmp_path / "r.html").write_text(text, encoding="utf-8")
     seen = subprocess.run(
         [

@@ -1,4 +1,4 @@
-"""Every command that seats an operator goes on where it was cut off, to the bytes that it would have left."""
+"""Each command with an operator resumes an interrupted session and writes the same bytes as without interruption."""
 
 import json
 import shutil
@@ -16,7 +16,7 @@ from tests.support.processes import a7sim_captured
 
 JOURNAL = "session.jsonl"
 HURRIED = {"plan.parallax_readings": "1"}
-NOT_LAID_RIGHT = ("--set", "photos.1.laid=upside down")
+UPSIDE_DOWN = ("--set", "photos.1.laid=upside down")
 
 
 def files_of(folder):
@@ -24,7 +24,7 @@ def files_of(folder):
 
 
 def cut_off(whole, folder, share):
-    """Leave what a session that was killed leaves, whose journal had come to a share of its length."""
+    """Write the files of a session that was killed after a share of its journal."""
     folder.mkdir()
     data = (whole / JOURNAL).read_bytes()
     header = data.index(b"\n") + 1
@@ -32,7 +32,7 @@ def cut_off(whole, folder, share):
     shutil.copy(whole / "session.scenario.json", folder)
 
 
-def without_what_was_torn(files):
+def without_torn_files(files):
     return {name: data for name, data in files.items() if not name.endswith(".torn")}
 
 
@@ -40,19 +40,19 @@ def without_what_was_torn(files):
     ("words", "ends_with"),
     [
         (("calibrate", "akwanga", "--points", 9, "--levels", 1, "--pointings", 1), 0),
-        (("compile", "akwanga", "--contour", 455, "--line", "road1", "--tremor", 3, *NOT_LAID_RIGHT), 1),
-        (("bridge", "bridge", "--seed", 3, *NOT_LAID_RIGHT), 1),
+        (("compile", "akwanga", "--contour", 455, "--line", "road1", "--tremor", 3, *UPSIDE_DOWN), 1),
+        (("bridge", "bridge", "--seed", 3, *UPSIDE_DOWN), 1),
     ],
     ids=["calibrate", "compile", "bridge"],
 )
-def test_a_command_that_was_cut_off_goes_on_to_the_same_bytes_and_exit_code(tmp_path, capsys, words, ends_with):
+def test_an_interrupted_command_resumes_to_the_same_bytes_and_exit_code(tmp_path, capsys, words, ends_with):
     whole, cut = tmp_path / "whole", tmp_path / "cut"
     before = a7sim_captured(capsys, *words, "--out", whole)
     cut_off(whole, cut, 0.6)
     after = a7sim_captured(capsys, words[0], "--resume", cut)
     assert (before.returncode, after.returncode) == (ends_with, ends_with)
     assert (after.stdout, after.stderr) == (before.stdout, before.stderr)
-    assert without_what_was_torn(files_of(cut)) == files_of(whole)
+    assert without_torn_files(files_of(cut)) == files_of(whole)
 
 
 @pytest.mark.parametrize("command", ["run", "bridge", "compile", "calibrate"])
@@ -64,7 +64,9 @@ def test_a_command_that_was_cut_off_goes_on_to_the_same_bytes_and_exit_code(tmp_
         (("--resume", "{folder}"), "{folder}/session.jsonl: expected the journal of a session: No such file"),
     ],
 )
-def test_who_says_nothing_too_much_or_what_is_not_there_gets_one_sentence(tmp_path, capsys, command, words, sentence):
+def test_the_error_message_for_missing_excess_or_wrong_arguments_is_one_sentence(
+    tmp_path, capsys, command, words, sentence
+):
     named = {"command": command, "folder": tmp_path}
     done = a7sim_captured(capsys, command, *(str(word).format(**named) for word in words))
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
@@ -73,7 +75,7 @@ def test_who_says_nothing_too_much_or_what_is_not_there_gets_one_sentence(tmp_pa
 
 @pytest.fixture(scope="module")
 def bridged(tmp_path_factory):
-    """The folder of two models bridged and then worked independently."""
+    """Return the folder of two models that were bridged and then measured as independent models."""
     scenario = load_scenario("bridge", HURRIED)
     scenario = msgspec.structs.replace(scenario, models=scenario.models[:2])
     out = tmp_path_factory.mktemp("bridged") / "whole"
@@ -82,7 +84,7 @@ def bridged(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridged, tmp_path):
+def test_a_bridge_interrupted_in_the_independent_models_resumes_there(bridged, tmp_path):
     cut = Path(shutil.copytree(bridged, tmp_path / "cut"))
     (cut / "results.json").unlink()
     shutil.rmtree(cut / INDEPENDENT)
@@ -92,11 +94,11 @@ def test_a_bridge_that_was_cut_off_at_the_independent_models_goes_on_there(bridg
         resumable.scenario, resumable.seed, RunOptions(cut, journal_options=JournalOptions(resumes=True))
     )
     assert json.loads((cut / "results.json").read_text(encoding="utf-8")) == json.loads(json.dumps(document))
-    assert without_what_was_torn(files_of(cut)) == files_of(bridged)
+    assert without_torn_files(files_of(cut)) == files_of(bridged)
 
 
 @pytest.mark.slow
-def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independent_models(
+def test_results_of_a_bridge_interrupted_in_the_independent_models_state_the_interruption(
     bridged, tmp_path, monkeypatch
 ):
     def interrupted(*_, **__):
@@ -113,8 +115,8 @@ def test_results_of_a_bridge_say_so_where_it_was_interrupted_among_the_independe
 
 
 @pytest.mark.slow
-def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_path):
-    """Cut off while bridging, in a folder that --force took and where other independent models had been."""
+def test_the_independent_models_of_another_strip_are_not_resumed(bridged, tmp_path):
+    """Interrupt while bridging in a folder taken with --force that had other independent models."""
     cut = tmp_path / "cut"
     (cut / INDEPENDENT).mkdir(parents=True)
     shutil.copy(bridged / JOURNAL, cut / INDEPENDENT)
@@ -124,8 +126,8 @@ def test_what_a_folder_had_of_another_strip_is_not_gone_on_with(bridged, tmp_pat
 
 
 @pytest.mark.parametrize(("left", "resumes"), [(None, False), (b"", False), (b'{"schema', False), (b'{}\n{"t"', True)])
-def test_a_part_is_gone_on_with_where_the_header_of_its_journal_is_whole(tmp_path, left, resumes):
-    """Cut off sooner, nothing was observed in it, and it is begun anew."""
+def test_a_part_is_resumed_if_the_header_of_its_journal_is_complete(tmp_path, left, resumes):
+    """Without a complete header the part has no observation and starts again."""
     if left is not None:
         (tmp_path / JOURNAL).write_bytes(left)
     assert JournalOptions(resumes=True).for_part(tmp_path) == JournalOptions(resumes=resumes)

@@ -1,4 +1,4 @@
-"""A run ends in the strip: its models on the ground, and every case of one with every case of the other."""
+"""A run computes the strip: its models on the ground, and all combinations of the cases of its models."""
 
 import csv
 import json
@@ -38,11 +38,11 @@ def all_strips(finished):
     return results, session.folder, session.result.stdout
 
 
-def test_without_errors_the_strip_returns_the_ground_within_what_the_counters_leave():
-    """Counters leave 0.02 gon in a model and 0.12 mm in the height of a centre; no film or eye adds to it.
+def test_without_errors_the_strip_returns_the_ground_within_the_least_counts():
+    """Counters cause 0.02 gon in a model and 0.12 mm in the height of a centre; film and eye add nothing.
 
-    0.02 gon over a base are 0.23 m in plan; 0.15 is a bound to this session, which has 0.122 (below 0.12 before drums
-    were turned finely).
+    0.02 gon over a base are 0.23 m in plan; 0.15 is a bound for this session, which has 0.122 (below 0.12 before
+    drums were turned finely).
     """
     strip = run(tilted_flight([(0.4, -0.3, 0.2), (-0.5, 0.6, -0.4), (0.2, 0.1, 0.5)]), 5)["strip"]
     everywhere = np.concatenate([residuals(strip, "control"), residuals(strip, "check")])
@@ -51,7 +51,7 @@ def test_without_errors_the_strip_returns_the_ground_within_what_the_counters_le
     assert strip["joins"][0]["max_residual_mm"] < 0.15
 
 
-def test_control_and_checks_are_accounted_for_apart(all_strips):
+def test_accuracy_is_given_for_control_and_checks_separately(all_strips):
     """Accuracy is the rms of the residuals of that role; plan is the distance of both coordinates."""
     for strip in all_strips[0]["strips"]:
         for on, role in (("control", "control"), ("checks", "check")):
@@ -62,8 +62,8 @@ def test_control_and_checks_are_accounted_for_apart(all_strips):
             assert accuracy["points"] == 6
 
 
-def test_checks_take_no_part_in_the_strip():
-    """A check moved by ten metres moves its own residual and nothing else; a control point moves the strip."""
+def test_checks_do_not_affect_the_strip():
+    """A check moved by ten metres changes only its own residual; a control point changes the strip."""
     scenario = load_scenario("akwanga", {"plan.parallax_readings": "1"})
     models = models_from_documents(run(scenario, 3)["models"])
     ground = ground_control(scenario, build_scene(scenario, 3))
@@ -97,7 +97,7 @@ def test_twenty_five_strips_are_numbered_as_in_the_thesis(all_strips):
     assert {path.name for path in out.iterdir()} >= {f"case-{case}" for case in "ABCDE"}
 
 
-def test_a_strip_of_equal_cases_is_the_one_that_a_run_of_that_case_gives(all_strips):
+def test_a_strip_of_equal_cases_equals_that_of_a_run_of_this_case(all_strips):
     document, out, _ = all_strips
     for number, case in ((1, "A"), (13, "C"), (25, "E")):
         alone = json.loads((out / f"case-{case}" / "results.json").read_text(encoding="utf-8"))["strip"]
@@ -105,15 +105,15 @@ def test_a_strip_of_equal_cases_is_the_one_that_a_run_of_that_case_gives(all_str
         assert {key: strip[key] for key in alone} == alone
 
 
-def test_the_diagram_in_words_names_the_points_of_every_case_and_the_ties(all_strips):
+def test_the_text_diagram_names_the_points_of_every_case_and_the_ties(all_strips):
     words = all_strips[0]["strips"][3]["in_words"]
     assert "model 1 (101 and 102) case A, oriented on 1 2 3 4 5 6;" in words
     assert "model 2 (102 and 103) case D, oriented on 1 2 3 4 5 6 d e f;" in words
     assert set(words.rpartition("joined on ")[2].split()) == {"102:centre", "1021", "1023", "1025", "C3", "C4"}
 
 
-def test_cards_of_a_run_give_its_strip_again(all_strips):
-    """The deck read back, joined and oriented is the strip of the session, as far as three decimals hold it."""
+def test_cards_of_a_run_reproduce_its_strip(all_strips):
+    """The cards read, joined and oriented give the strip of the session to three decimals."""
     _, out, _ = all_strips
     folder = out / "case-A"
     results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
@@ -135,19 +135,19 @@ def test_points_get_card_numbers_of_their_own():
 
 
 def test_accuracy_is_of_the_order_of_the_theses_first_case(all_strips):
-    """The thesis prints 0.16 in plan and height for case 1; case 25 (2.9, 0.5) is nothing an operator gets here."""
+    """The thesis prints 0.16 in plan and height for case 1; no operator here gets the values of case 25 (2.9, 0.5)."""
     for strip in all_strips[0]["strips"]:
         checks = strip["accuracy_m"]["checks"]
         assert 0.02 < checks["plan"] < 0.16
         assert 0.03 < checks["height"] < 0.16
 
 
-def test_a_scenario_without_control_or_of_too_many_models_is_refused():
+def test_a_scenario_without_control_or_of_too_many_models_is_rejected():
     with pytest.raises(A7SimError, match="expected ground control in the scenario, got none"):
         run_combinations(load_scenario("dewitt-pair"), 1)
 
 
-def test_strips_at_the_command_line_print_a_line_a_strip(all_strips):
+def test_the_command_line_prints_one_line_for_each_strip(all_strips):
     lines = re.findall(r"^\d+ +[A-E] [A-E] .*$", all_strips[2], re.M)
     assert len(lines) == 25
     assert lines[24].split()[1:3] == ["E", "E"]
@@ -156,12 +156,12 @@ def test_strips_at_the_command_line_print_a_line_a_strip(all_strips):
     assert "--strips all: expected no --case beside it" in wrong.stderr
 
 
-def test_a_run_without_control_says_that_there_is_no_strip(finished):
+def test_a_run_without_control_reports_that_there_is_no_strip(finished):
     done = finished("dewitt-pair", 7).result
     assert "No strip on the ground: the scenario has no ground control" in done.stdout
 
 
-def test_schuts_strip_comes_back_to_a_millimetre_at_the_command_line():
+def test_the_command_line_reproduces_schuts_strip_to_a_millimetre():
     """S: eleven exactly vertical photographs, 3 km bases; horizontal and vertical control at the ends."""
     done = a7sim("run", "schut-1956", "--json")
     assert done.returncode == 0, done.stderr
@@ -170,7 +170,7 @@ def test_schuts_strip_comes_back_to_a_millimetre_at_the_command_line():
     assert max(strip["accuracy_m"]["checks"]["largest"].values()) < 0.001
 
 
-def test_the_strip_of_paper_p_is_measured_in_two_ways_side_by_side(finished):
+def test_the_strip_of_paper_p_is_measured_by_two_methods(finished):
     out, done = finished("a8-strip")
     document = json.loads((out / "results.json").read_text(encoding="utf-8"))
     assert set(document["ways"]) == {"comparator", "A8"}

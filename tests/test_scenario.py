@@ -1,4 +1,4 @@
-"""Scenario files: every mistake at once with its path, and every story that comes with a7sim told to its end."""
+"""Scenario files: all mistakes are reported together with their paths, and every shipped scenario runs to its end."""
 
 import tomllib
 from pathlib import Path
@@ -29,11 +29,11 @@ def mistakes_of(raw):
 
 
 WORKED_ELSEWHERE = {"bridge"}
-"""By test_bridging_shipped: bridged, and as independent models."""
+"""Scenarios that test_bridging_shipped runs, bridged and as independent models."""
 
 
 @pytest.mark.parametrize("path", [p for p in SCENARIOS if p.stem not in WORKED_ELSEWHERE], ids=lambda path: path.stem)
-def test_every_scenario_is_worked_to_its_end(path):
+def test_every_scenario_runs_to_its_end(path):
     scenario = load_scenario(path)
     document = run_all_methods(scenario, 1)
     assert document["status"] == "complete", document["message"]
@@ -43,7 +43,7 @@ def test_every_scenario_is_worked_to_its_end(path):
         assert not strip["warnings"]
 
 
-def test_every_mistake_is_named_at_once_with_its_path():
+def test_all_mistakes_are_reported_together_with_their_paths():
     raw = akwanga()
     raw["sed"] = 3
     raw["title"] = ""
@@ -156,7 +156,7 @@ def test_every_mistake_is_named_at_once_with_its_path():
         ),
     ],
 )
-def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):
+def test_the_error_message_for_each_kind_of_mistake_is_one_sentence(change, mistake):
     raw = akwanga() | {"air": {}}
     raw["instrument"]["condition"] = {}
     change(raw)
@@ -223,7 +223,7 @@ def test_a_mistake_of_each_kind_is_one_sentence(change, mistake):
         ),
     ],
 )
-def test_mistakes_about_who_measures_a_strip_are_named(change, mistakes):
+def test_mistakes_in_the_methods_of_a_strip_are_reported(change, mistakes):
     raw = a8_strip()
     change(raw)
     assert mistakes_of(raw) == mistakes
@@ -237,7 +237,7 @@ def test_without_models_every_photograph_is_paired_with_the_next():
     ]
 
 
-def test_a_scenario_for_the_comparator_alone_needs_no_plan_and_has_none():
+def test_a_scenario_with_only_the_comparator_has_no_plan():
     scenario = load_scenario("schut-1956")
     assert scenario.work == ["comparator"]
     assert scenario.half_width == 85.0
@@ -245,24 +245,24 @@ def test_a_scenario_for_the_comparator_alone_needs_no_plan_and_has_none():
         _ = scenario.plan
 
 
-def test_a_file_that_is_not_there_is_named_with_what_there_is():
+def test_the_error_message_for_a_missing_file_names_the_existing_scenarios():
     with pytest.raises(ScenarioError, match=r"nowhere\.toml: expected a scenario file or one of a8-strip, akwanga, "):
         load_scenario("nowhere.toml")
 
 
-def test_a_folder_is_not_called_missing(tmp_path):
+def test_the_error_message_for_a_folder_does_not_call_it_missing(tmp_path):
     with pytest.raises(ScenarioError, match=r"expected a scenario file .*, found a folder"):
         load_scenario(tmp_path)
 
 
-def test_broken_toml_is_named_with_its_line(tmp_path):
+def test_the_error_message_for_broken_toml_names_the_line(tmp_path):
     path = tmp_path / "broken.toml"
     path.write_text('schema_version = 1\ntitle = "x\n', encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"broken\.toml: expected TOML.*line 2"):
         load_scenario(path)
 
 
-def test_a_measured_file_beside_the_scenario_must_be_there():
+def test_a_measured_file_of_a_scenario_must_exist():
     raw = tomllib.loads(next(p for p in SCENARIOS if p.stem == "dewitt-pair").read_text(encoding="utf-8"))
     raw["photos"][0]["measured"]["file"] = "lost.csv"
     assert mistakes_of(raw) == [
@@ -270,7 +270,7 @@ def test_a_measured_file_beside_the_scenario_must_be_there():
     ]
 
 
-def test_overrides_reach_any_value_and_a_wrong_path_is_named():
+def test_overrides_can_set_any_value_and_a_wrong_path_is_reported():
     scenario = load_scenario("akwanga", {"observer.parallax_um": "2.5", "photos.1.phi": "3", "plan.case": "E"})
     assert (scenario.observer.parallax_um, scenario.photos[1].phi, scenario.plan.case) == (2.5, 3.0, "E")
     with pytest.raises(ScenarioError, match=r"photos\.7\.phi"):
@@ -279,7 +279,7 @@ def test_overrides_reach_any_value_and_a_wrong_path_is_named():
         load_scenario("akwanga", {"plan.cse": "E"})
 
 
-def test_the_schema_describes_what_the_scenarios_say():
+def test_the_schema_describes_the_keys_of_the_scenarios():
     schema = scenario_schema()
     described = schema["$defs"]["Scenario"]["properties"]
     for path in SCENARIOS:
@@ -293,7 +293,7 @@ def test_the_schema_describes_what_the_scenarios_say():
     assert msgspec.json.encode(schema)
 
 
-def test_akwanga_stands_on_the_numbers_of_the_thesis():
+def test_akwanga_has_the_numbers_of_the_thesis():
     scenario = load_scenario("akwanga")
     assert scenario.camera.c == 152.676
     assert scenario.plan.bx == 194.99
@@ -306,7 +306,7 @@ def test_akwanga_stands_on_the_numbers_of_the_thesis():
     assert [abs(base) / 8000.0 * 1000.0 for base in bases] == pytest.approx([91.0, 90.75], abs=0.3)
 
 
-def test_the_real_pair_is_reference_03(reference):
+def test_the_real_pair_equals_reference_03(reference):
     published = tomllib.loads((reference / "03_dewitt_public_domain.toml").read_text(encoding="utf-8"))
     expected = published["relative_orientation"]
     scenario = load_scenario("dewitt-pair")

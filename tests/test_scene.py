@@ -49,7 +49,7 @@ def test_undeformed_film_holds_the_exact_images_about_the_principal_point():
         np.testing.assert_allclose(marks.xy, exact + np.array(scenario.camera.principal_point)[:, None], atol=1e-9)
 
 
-def test_the_standard_points_lie_as_in_figure_4_1():
+def test_the_standard_points_are_those_of_figure_4_1():
     scenario = akwanga(film=FAULTLESS_FILM)
     scene = build_scene(scenario, 1)
     left = scene.photographs["101"].points
@@ -61,7 +61,7 @@ def test_the_standard_points_lie_as_in_figure_4_1():
     assert scene.standard_points["1"]["2"] == scene.standard_points["2"]["1"] == "1021"
 
 
-def test_film_shrinks_and_its_noise_is_as_large_as_asked():
+def test_film_shrinks_and_its_noise_has_the_given_standard_deviation():
     many = [
         build_scene(
             akwanga(film=FilmDeformation(shrinkage_ppm=(500.0, 300.0), irregular_um=3.0, identification_um=4.0)), seed
@@ -76,13 +76,13 @@ def test_film_shrinks_and_its_noise_is_as_large_as_asked():
     assert errors.std() == pytest.approx(0.005, rel=0.05)
 
 
-def test_the_same_seed_is_the_same_film_and_another_is_another():
+def test_the_same_seed_gives_the_same_film_and_another_gives_another_film():
     first, again, other = (build_scene(akwanga(), seed).photographs["101"].points.xy for seed in (5, 5, 6))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 1e-4
 
 
-def test_curvature_and_refraction_are_switches_with_the_size_of_the_textbook():
+def test_curvature_and_refraction_can_be_switched_on_with_the_size_of_the_textbook():
     straight, bent = (build_scene(akwanga(film=FAULTLESS_FILM, air=air), 1) for air in (
         Air(),
         Air(earth_curvature=True, refraction=True),
@@ -109,8 +109,8 @@ def test_the_real_pair_is_mounted_as_measured():
     assert relative.source.startswith("Dewitt")
 
 
-def test_comparator_counts_come_to_film_by_their_fiducials(reference, tmp_path):
-    """Reference 02: eight fiducials of a real photograph; what is left is film and pointing, some hundredths of mm."""
+def test_comparator_counts_are_transformed_to_film_by_their_fiducials(reference, tmp_path):
+    """Reference 02: eight fiducials of a real photograph; residuals of film and pointing are some hundredths of mm."""
     data = tomllib.loads((reference / "02_calgary_lab_pair_27_28.toml").read_text(encoding="utf-8"))
     fiducials = data["interior"]["fiducials"]
     camera = Camera(
@@ -130,7 +130,7 @@ def test_comparator_counts_come_to_film_by_their_fiducials(reference, tmp_path):
     assert distances[0] != pytest.approx(distances[1], abs=1e-3)
 
 
-def test_counts_mirrored_by_the_comparator_are_mirrored_back(tmp_path):
+def test_the_mirroring_of_counts_by_the_comparator_is_undone(tmp_path):
     camera = load_scenario("akwanga").camera
     rows = [f"p,{f.name},{1000 + 100 * f.x},{5000 - 100 * f.y}" for f in camera.fiducials] + ["p,P,3000,4000"]
     (tmp_path / "counts.csv").write_text("photo,point,x,y\n" + "\n".join(rows), encoding="utf-8")
@@ -151,7 +151,7 @@ def test_counts_mirrored_by_the_comparator_are_mirrored_back(tmp_path):
         ("photo,point,x,y\nleft,a,1,200\n", ["format", "(1.0, 200.0) for point a"]),
     ],
 )
-def test_a_bad_file_is_named_with_line_and_column(tmp_path, content, words):
+def test_the_error_message_for_a_bad_file_names_line_and_column(tmp_path, content, words):
     path = tmp_path / "bad.csv"
     path.write_text(content, encoding="utf-8")
     with pytest.raises(A7SimError) as caught:
@@ -170,7 +170,7 @@ def test_a_bad_file_is_named_with_line_and_column(tmp_path, content, words):
     ],
     ids=["none measured", "two confused"],
 )
-def test_counts_without_their_fiducials_or_with_confused_ones_are_refused(tmp_path, scale, moved, words):
+def test_counts_with_missing_or_confused_fiducials_are_rejected(tmp_path, scale, moved, words):
     camera = load_scenario("akwanga").camera
     other = dict(zip(moved, reversed(moved), strict=True))
     named = [(other.get(f.name, f.name), f) for f in camera.fiducials if f.name in scale]

@@ -1,4 +1,4 @@
-"""Operator scripts (issue 6): a session written by hand is a session; what it expects comes, or it says where not."""
+"""Operator scripts (issue 6): a script runs a session; a result other than expected is reported with its line."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def played(tmp_path, text):
 
 
 @pytest.mark.parametrize("name", ["interior", "clearing", "centres"])
-def test_the_scripts_of_the_thesis_find_all_that_they_expect(name):
+def test_the_scripts_of_the_thesis_get_all_expected_results(name):
     script = read_script(find_script(name))
     assert sum(isinstance(each, Expect) for each in script.statements) >= 11
     runner = ScriptRunner(script)
@@ -37,11 +37,11 @@ def test_the_scripts_of_the_thesis_find_all_that_they_expect(name):
     )
 
 
-def test_there_is_a_test_of_every_script():
+def test_every_script_has_a_test():
     assert {path.stem for path in SCRIPTS.glob("*.a7s")} == {"interior", "clearing", "centres"}
 
 
-def test_lines_waits_and_comments_are_what_they_say(tmp_path):
+def test_lines_waits_expectations_and_comments_are_read(tmp_path):
     text = """DRIV:X 10 # to the right
         NOTE "a # in quotes, and 'more'" # not here
         wait 12.5
@@ -49,9 +49,9 @@ def test_lines_waits_and_comments_are_what_they_say(tmp_path):
         expect COUN? = 10.5, 0, -300 +- 0.5   # half a mm
         expect PHOT:CAT? = "101", 102, *, "grid"
         """
-    failed, said, player = played(tmp_path, text)
+    failed, sent, player = played(tmp_path, text)
     assert failed is None
-    assert said == ["DRIV:X 10", "NOTE \"a # in quotes, and 'more'\"", "COUN:X?", "COUN?", "PHOT:CAT?"]
+    assert sent == ["DRIV:X 10", "NOTE \"a # in quotes, and 'more'\"", "COUN:X?", "COUN?", "PHOT:CAT?"]
     assert player.instrument.client_count == 1
 
 
@@ -65,16 +65,16 @@ def test_lines_waits_and_comments_are_what_they_say(tmp_path):
         ("COUN:X?\nDRIV:X 9999\nDRIV:X 1", 3, "DRIV:X 9999 to be obeyed", '-222,"Data out of range;DRIV:X 9999: X'),
     ],
 )
-def test_what_does_not_come_is_named_with_its_line(tmp_path, text, line, expected, got):
+def test_an_unexpected_result_is_reported_with_its_line(tmp_path, text, line, expected, got):
     failed, _, _ = played(tmp_path, text)
     assert (failed.place, failed.expected) == (SourceLocation(tmp_path / "s.a7s", line), expected)
     assert failed.got.startswith(got)
 
 
-def test_an_error_that_is_expected_is_none(tmp_path):
-    failed, said, _ = played(tmp_path, "DRIV:X 9999\nexpect SYST:ERR? = -222, *\nDRIV:X 1")
+def test_an_expected_error_is_no_failure(tmp_path):
+    failed, sent, _ = played(tmp_path, "DRIV:X 9999\nexpect SYST:ERR? = -222, *\nDRIV:X 1")
     assert failed is None
-    assert said[-1] == "DRIV:X 1"
+    assert sent[-1] == "DRIV:X 1"
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_an_error_that_is_expected_is_none(tmp_path):
         (FIRST + "include other.a7s", "other.a7s, line 1: expected the scenario and seed of"),
     ],
 )
-def test_what_is_no_script_gets_one_sentence_with_file_and_line(tmp_path, text, sentence):
+def test_the_error_message_for_a_bad_script_names_file_and_line(tmp_path, text, sentence):
     (tmp_path / "other.a7s").write_text("scenario akwanga seed 8\n")
     (tmp_path / "s.a7s").write_text(text)
     with pytest.raises(A7SimError) as raised:
@@ -101,7 +101,7 @@ def test_what_is_no_script_gets_one_sentence_with_file_and_line(tmp_path, text, 
     assert sentence in str(raised.value)
 
 
-def test_at_the_command_line_a_script_is_told_judged_and_kept(tmp_path):
+def test_the_command_line_prints_checks_and_stores_a_script(tmp_path):
     (tmp_path / "s.a7s").write_text(FIRST + "DRIV:X 10;*OPC?\nexpect COUN:X? = 10")
     done = replay(tmp_path / "s.a7s", "--out", tmp_path / "out")
     assert (done.returncode, done.stderr) == (0, "")
@@ -114,5 +114,5 @@ def test_at_the_command_line_a_script_is_told_judged_and_kept(tmp_path):
     assert done.stderr == f"a7sim: {tmp_path}/s.a7s, line 2: expected COUN:X? = 11, got 0.00\n"
 
 
-def test_a_script_that_says_nothing_is_played_to_its_end(tmp_path):
+def test_an_empty_script_runs_to_its_end(tmp_path):
     assert played(tmp_path, "")[:2] == (None, [])

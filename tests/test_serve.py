@@ -39,7 +39,7 @@ def test_clients_share_the_instrument_and_each_has_its_own_errors(served):
     assert first.ask("SYST:ERR:COUN?") == "1"
 
 
-def test_who_holds_the_lock_turns_alone_and_a_holder_who_disconnects_frees_it(served):
+def test_only_the_lock_holder_moves_elements_and_its_disconnection_releases_the_lock(served):
     holder, other = served.line(), served.line()
     assert (holder.ask("SYST:LOCK:REQ?"), other.ask("SYST:LOCK:REQ?")) == ("1", "0")
     assert other.ask("DRIV:X 5;:COUN:X?;:SYST:ERR?").startswith("0.00;-203,")
@@ -48,7 +48,7 @@ def test_who_holds_the_lock_turns_alone_and_a_holder_who_disconnects_frees_it(se
     assert other.ask("DRIV:X 5;:COUN:X?;:SYST:LOCK:REQ?") == "5.00;1"
 
 
-def test_a_client_that_sends_and_hangs_up_its_half_is_answered_and_let_go(served):
+def test_a_client_that_closes_its_sending_half_is_answered_and_disconnected(served):
     line = served.line()
     line.send(b"DRIV:X 7\n" + b"COUN:X?\n" * 2000)
     line.socket.shutdown(socket.SHUT_WR)
@@ -70,7 +70,7 @@ def test_a_client_that_sends_and_hangs_up_its_half_is_answered_and_let_go(served
         (b"\xff\xfb\x2c\xff\xfa\nSYST:ERR:COUN?\n", ["1"]),
     ],
 )
-def test_whatever_bytes_come_in_whatever_pieces(served, sent, replies):
+def test_replies_do_not_depend_on_how_bytes_are_split(served, sent, replies):
     for size in (1, 3, len(sent)):
         line = served.line()
         for start in range(0, len(sent), size):
@@ -81,8 +81,8 @@ def test_whatever_bytes_come_in_whatever_pieces(served, sent, replies):
 
 @pytest.mark.skipif(QUICK_ACKNOWLEDGEMENT is None, reason="an option of Linux")
 @pytest.mark.parametrize("kind", ["tcp", "rfc2217"])
-def test_a_client_with_nagles_algorithm_waits_for_no_late_acknowledgement(kind):
-    """Commands have no reply that could carry the acknowledgement, without which the client keeps its next line."""
+def test_a_client_with_nagles_algorithm_waits_for_no_delayed_acknowledgement(kind):
+    """A command has no reply that carries the acknowledgement, and the client holds its next line until then."""
     with ServerThread(endpoints=Endpoints(**{kind: [ANY_PORT]})) as served:
         line = served.line()
         if kind == "rfc2217":
@@ -98,7 +98,7 @@ def test_a_client_with_nagles_algorithm_waits_for_no_late_acknowledgement(kind):
 # --- movement ------------------------------------------------------------------------------------------
 
 
-def test_without_the_walls_clock_waiting_takes_simulated_time_only(served):
+def test_without_real_time_waiting_takes_simulated_time_only(served):
     line = served.line()
     began = time.monotonic()
     assert line.ask("BASE:BX 200;*OPC?;BX 0;*OPC?;*WAI;BX?") == "1;1;0.00"
@@ -106,7 +106,7 @@ def test_without_the_walls_clock_waiting_takes_simulated_time_only(served):
     assert served.clock.now == 200.0
 
 
-def test_who_waits_by_looking_at_the_status_comes_to_an_end(served):
+def test_waiting_by_polling_the_status_ends(served):
     line = served.line()
     line.send(b"*CLS;DRIV:X 10;*OPC\n")
     looks = 1
@@ -115,7 +115,7 @@ def test_who_waits_by_looking_at_the_status_comes_to_an_end(served):
     assert 10 <= looks <= 12
 
 
-def test_on_the_walls_clock_waiting_really_waits_and_the_others_go_on():
+def test_in_real_time_a_waiting_client_does_not_block_the_others():
     with ServerThread(realtime=True) as served:
         waiting, other = served.line(), served.line()
         began = time.monotonic()
@@ -131,7 +131,7 @@ def test_on_the_walls_clock_waiting_really_waits_and_the_others_go_on():
         assert 0.4 <= time.monotonic() - began < 3.0
 
 
-def test_a_client_that_goes_while_it_waits_leaves_nothing_behind():
+def test_the_server_answers_after_a_waiting_client_disconnects():
     with ServerThread(realtime=True) as served:
         waiting = served.line()
         waiting.send(b"SYST:LOCK:REQ?;:DRIV:X 200;*OPC?\n" + b"COUN:X?\n" * 10000)
@@ -151,7 +151,7 @@ def guarded():
 
 
 @pytest.mark.parametrize("line", ["COUN:X?", "*OPC?", "SYST:ERR?", "SYST:LOCK:REQ?", "FOO?", "SYST:HELP:HEAD?"])
-def test_before_the_login_only_the_identity_is_told(guarded, line):
+def test_before_the_login_only_the_identity_is_answered(guarded, line):
     client = guarded.line()
     client.send(line.encode() + b";*CLS;DRIV:X 5;:RST\n")
     assert client.ask("*IDN?") == IDENTITY
@@ -159,7 +159,7 @@ def test_before_the_login_only_the_identity_is_told(guarded, line):
     assert guarded.instrument.lock_holder is None
 
 
-def test_after_the_login_the_errors_from_before_it_are_there(guarded):
+def test_after_the_login_the_earlier_errors_are_in_the_queue(guarded):
     client = guarded.line()
     client.send(b'COUN:X?\nSYST:LOG "sesame 8"\n:FOO\n')
     client.send('SYST:LOG "sesame 8x"\n'.encode("latin-1"))
@@ -169,7 +169,7 @@ def test_after_the_login_the_errors_from_before_it_are_there(guarded):
     )
 
 
-def test_the_journal_never_holds_a_token_right_or_wrong():
+def test_the_journal_contains_no_token_right_or_wrong():
     heard = []
     with ServerThread(SharedInstrument(Autograph(VARIANTS["A7"]), heard.append, token="sesame")) as guarded:
         client = guarded.line()
@@ -206,7 +206,7 @@ def test_the_journal_never_holds_a_token_right_or_wrong():
         ("EYEP:PICT? 1025,1,1", -222),
     ],
 )
-def test_every_limit_of_a_line_has_its_error_at_once_and_the_next_line_works(served, line, number):
+def test_every_limit_of_a_line_gives_its_error_at_once_and_the_next_line_is_executed(served, line, number):
     client = served.line()
     began = time.monotonic()
     assert client.ask(f"{line}\n*CLS?\nSYST:ERR?").split(",")[0] == str(number)
@@ -214,7 +214,7 @@ def test_every_limit_of_a_line_has_its_error_at_once_and_the_next_line_works(ser
     assert client.ask("*IDN?") == IDENTITY
 
 
-def test_the_error_queue_overflows_into_its_last_entry(served):
+def test_overflow_replaces_the_last_entry_of_the_error_queue(served):
     client = served.line()
     client.send(b"FOO\n" * 1000)
     assert client.ask("SYST:ERR:COUN?") == str(QUEUE_LENGTH)
@@ -233,7 +233,7 @@ def test_the_replies_to_a_line_are_bounded(served):
     assert client.ask("SYST:ERR?;*ESR?").startswith('-430,"Query DEADLOCKED;')
 
 
-def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
+def test_a_client_above_the_limit_is_disconnected_without_effect_on_the_others():
     with ServerThread(limits=ServerLimits(max_clients=3)) as served:
         lines = [served.line() for _ in range(3)]
         assert [line.ask("*TST?") for line in lines] == ["0"] * 3
@@ -245,7 +245,7 @@ def test_the_client_too_many_is_told_and_let_go_and_the_others_do_not_notice():
         assert served.line().ask("*TST?") == "0"
 
 
-def test_why_a_client_is_turned_away():
+def test_the_error_message_for_a_client_above_the_limit_names_the_limit():
     with ServerThread(limits=ServerLimits(max_clients=1)) as served:
         assert served.line().ask("*TST?") == "0"
         late = served.line()
@@ -253,13 +253,13 @@ def test_why_a_client_is_turned_away():
         assert late.wait_closed()
 
 
-def test_64_clients_are_let_in_unless_said_otherwise(served):
+def test_the_default_limit_is_64_clients(served):
     lines = [served.line() for _ in range(65)]
     assert [line.ask("*TST?") for line in lines[:64]] == ["0"] * 64
     assert lines[64].read().startswith("-200,")
 
 
-def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
+def test_only_the_client_that_does_not_read_is_disconnected_and_its_buffer_is_bounded():
     with ServerThread(limits=ServerLimits(write_timeout=0.5)) as served:
         other = served.line()
         assert other.ask("*TST?") == "0"
@@ -275,18 +275,18 @@ def test_a_client_that_does_not_read_is_dropped_alone_and_keeps_little():
             try:
                 slow.socket.send(flood)
             except BlockingIOError:
-                kept += served.call(lambda: [_kept(wire) for wire in served.server._wires])
+                kept += served.call(lambda: [_buffer_sizes(wire) for wire in served.server._wires])
                 assert other.ask("COUN:X?") == "0.00"
                 gone = served.call(lambda: served.server.clients) == 1
             except ConnectionError:
                 gone = True
         assert other.ask("*IDN?") == IDENTITY
-        unread, unheard = map(max, zip(*kept, strict=True))
+        unread, unprocessed = map(max, zip(*kept, strict=True))
         assert MAX_UNREAD < unread < 2 * MAX_UNREAD
-        assert unheard <= MAX_READ
+        assert unprocessed <= MAX_READ
 
 
-def _kept(wire):
+def _buffer_sizes(wire):
     return wire._transport.get_write_buffer_size(), len(wire._session._backlog)
 
 
@@ -300,7 +300,7 @@ def test_a_client_that_reads_late_gets_every_reply_in_order(served):
     sender.join()
 
 
-def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
+def test_a_silent_client_is_disconnected_with_an_error_and_an_active_one_is_not():
     with ServerThread(limits=ServerLimits(idle_timeout=0.4)) as served:
         silent, speaking = served.line(), served.line()
         assert silent.ask("SYST:LOCK:REQ?") == "1"
@@ -314,7 +314,7 @@ def test_who_says_nothing_is_told_and_let_go_and_who_speaks_stays():
 
 
 @pytest.mark.slow
-def test_ten_thousand_connections_opened_and_dropped_leave_nothing(served):
+def test_ten_thousand_closed_connections_leave_no_open_descriptor(served):
     steady = served.line()
     assert steady.ask("*TST?") == "0"
     descriptors = Path("/proc/self/fd")
@@ -334,7 +334,7 @@ def test_ten_thousand_connections_opened_and_dropped_leave_nothing(served):
 # --- fairness ------------------------------------------------------------------------------------------
 
 
-def test_a_burst_starves_nobody(served):
+def test_a_burst_of_one_client_does_not_delay_another(served):
     bursting, other = served.line(), served.line()
     burst = (b"*RST;" * 100 + b":COUN:X?\n") * 150
     stop = threading.Event()
@@ -356,7 +356,7 @@ def test_a_burst_starves_nobody(served):
     assert median(took) < 0.1
 
 
-def test_a_hundred_clients_polling_at_once_are_all_served_alike():
+def test_a_hundred_polling_clients_get_similar_shares():
     with ServerThread(limits=ServerLimits(max_clients=100)) as served:
         lines = [served.line() for _ in range(100)]
         for n, line in enumerate(lines):
@@ -368,7 +368,7 @@ def test_a_hundred_clients_polling_at_once_are_all_served_alike():
 
 
 def _polled(lines, seconds):
-    """Let each client ask again as soon as it is answered; return how often each was."""
+    """Send the next query of each client after its reply; return the number of replies of each."""
     waiting = selectors.DefaultSelector()
     counts = [0] * len(lines)
     for n, line in enumerate(lines):

@@ -1,4 +1,4 @@
-"""`a7sim serve` at the command line (issue 5): what it prints and refuses, how it stops, what memory it takes."""
+"""`a7sim serve` at the command line (issue 5): its output, errors, end and memory."""
 
 import errno
 import json
@@ -22,9 +22,9 @@ IDENTITY = f"WILD HEERBRUGG,A7,3268,{a7sim.__version__}"
 
 @pytest.fixture
 def refused(capsys, monkeypatch):
-    """Return what a server that does not begin says."""
+    """Return a function that gives the error message of a server that does not start."""
 
-    def told(*arguments, **environment):
+    def error_of(*arguments, **environment):
         for name, value in environment.items():
             monkeypatch.setenv(name, value)
         done = a7sim_captured(capsys, "serve", *arguments)
@@ -32,48 +32,48 @@ def refused(capsys, monkeypatch):
         assert "Traceback" not in done.stderr
         return done.stderr
 
-    return told
+    return error_of
 
 
 @pytest.fixture(scope="module")
-def everywhere(tmp_path_factory):
-    """A server with three doors."""
+def three_endpoints(tmp_path_factory):
+    """Run a server with three endpoints."""
     link = tmp_path_factory.mktemp("line") / "a7"
     with RunningServer(*ANY_TCP_PORT, "--rfc2217", "127.0.0.1:0", "--pty", str(link), "--seed", "7") as running:
         yield running
 
 
-def test_the_document_says_where_it_listens_and_all_doors_lead_to_one_instrument(everywhere):
-    document = everywhere.document
+def test_the_document_contains_all_endpoints_and_they_share_one_instrument(three_endpoints):
+    document = three_endpoints.document
     assert (document["schema_version"], document["command"], document["seed"]) == (1, "serve", 7)
-    assert [door["kind"] for door in document["listening"]] == ["tcp", "rfc2217", "pty"]
-    assert [door["url"].partition("://")[0] for door in document["listening"][:2]] == ["tcp", "rfc2217"]
-    for n, door in enumerate(document["listening"]):
-        with serial.serial_for_url(door["url"], timeout=TIMEOUT_S) as port:
+    assert [endpoint["kind"] for endpoint in document["listening"]] == ["tcp", "rfc2217", "pty"]
+    assert [endpoint["url"].partition("://")[0] for endpoint in document["listening"][:2]] == ["tcp", "rfc2217"]
+    for n, endpoint in enumerate(document["listening"]):
+        with serial.serial_for_url(endpoint["url"], timeout=TIMEOUT_S) as port:
             client = Client(port)
             assert client.ask("*IDN?") == IDENTITY
             assert client.ask(f"COUN:X?;:DRIV:X {n + 1};:COUN:X?") == f"{n}.00;{n + 1}.00"
 
 
-def test_no_second_server_takes_the_terminal_of_one_that_serves(everywhere, refused):
-    link = next(door["path"] for door in everywhere.document["listening"] if door["kind"] == "pty")
+def test_a_second_server_does_not_take_the_terminal_of_a_running_one(three_endpoints, refused):
+    link = next(endpoint["path"] for endpoint in three_endpoints.document["listening"] if endpoint["kind"] == "pty")
     device = Path(link).readlink()
     assert f"--pty {link}: expected a path of its own" in refused("akwanga", "--tcp", "127.0.0.1:0", "--pty", link)
     assert Path(link).readlink() == device
 
 
-def test_no_line_without_end_of_64_mib_makes_the_server_grow(everywhere):
-    with everywhere.line() as line:
+def test_an_endless_line_of_64_mib_does_not_increase_the_memory_of_the_server(three_endpoints):
+    with three_endpoints.line() as line:
         piece = b"x" * (1 << 20)
         line.send(piece)
         line.send(b"\n")
         assert line.ask("SYST:ERR?").startswith("-363,")
-        before = _resident(everywhere.process.pid)
+        before = _resident(three_endpoints.process.pid)
         for _ in range(64):
             line.send(piece)
         line.send(b"\n")
         assert line.ask("SYST:ERR?").startswith("-363,")
-        assert _resident(everywhere.process.pid) - before < 1024
+        assert _resident(three_endpoints.process.pid) - before < 1024
         assert line.ask("*IDN?") == IDENTITY
 
 
@@ -84,7 +84,7 @@ def _resident(pid):
 
 
 def test_no_line_of_the_language_opens_reads_or_writes_a_file():
-    """Every header with texts that name files, watched by the audit hooks of the interpreter (PEP 578)."""
+    """Send every header with texts that name files, under the audit hooks of the interpreter (PEP 578)."""
     done = subprocess.run([sys.executable, "-c", _WATCHED], capture_output=True, check=False, text=True)
     assert done.stdout.splitlines()[-1] == "audited: ['open']", done.stdout + done.stderr
 
@@ -120,7 +120,7 @@ print("audited:", heard)
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
-def test_a_signal_ends_it_within_a_second_with_link_gone_and_journal_whole(tmp_path, number):
+def test_a_signal_stops_the_server_within_a_second_with_link_removed_and_journal_complete(tmp_path, number):
     link, out = tmp_path / "a7", tmp_path / "session"
     with RunningServer(*ANY_TCP_PORT, "--pty", str(link), "--out", str(out)) as running:
         line = running.line()
@@ -134,11 +134,11 @@ def test_a_signal_ends_it_within_a_second_with_link_gone_and_journal_whole(tmp_p
     assert text.endswith("}\n")
     header, *events = map(json.loads, text.splitlines())
     assert header["seed"] == running.document["seed"]
-    said = [event["text"] for event in events if event.get("dir") in (">", "<")]
-    assert said[:2] == ["DRIV:X 5;:COUN:X?", "5.00"]
+    lines = [event["text"] for event in events if event.get("dir") in (">", "<")]
+    assert lines[:2] == ["DRIV:X 5;:COUN:X?", "5.00"]
 
 
-def test_ready_comes_last_and_quiet_says_nothing():
+def test_ready_is_the_last_line_printed():
     with subprocess.Popen([*SERVE, "akwanga", *ANY_TCP_PORT], stdout=subprocess.PIPE, text=True) as process:
         kind, url = process.stdout.readline().split()
         assert process.stdout.readline() == "ready\n"
@@ -148,7 +148,7 @@ def test_ready_comes_last_and_quiet_says_nothing():
         assert (process.stdout.read(), process.wait(TIMEOUT_S)) == ("", 0)
 
 
-def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
+def test_a_token_from_a_file_or_the_environment_is_required(tmp_path):
     token = tmp_path / "token"
     token.write_text("heerbrugg\n")
     for arguments, environment in (
@@ -180,14 +180,14 @@ def test_a_token_from_a_file_or_the_environment_is_asked_for(tmp_path):
         (["--baud", "1"], "--baud"),
     ],
 )
-def test_what_cannot_be_served_is_said_in_a_sentence(arguments, sentence, refused):
+def test_the_error_message_for_wrong_arguments_is_one_sentence(arguments, sentence, refused):
     assert sentence in refused("akwanga", *arguments, A7SIM_TOKEN="")
 
 
-def test_an_address_that_is_taken_is_said_and_nothing_stays_behind(tmp_path, refused):
+def test_the_error_message_names_an_address_in_use_and_no_link_remains(tmp_path, refused):
     link = tmp_path / "a7"
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"
-        said = refused("akwanga", "--tcp", "127.0.0.1:0", "--tcp", address, "--pty", str(link))
-    assert f"--tcp {address}: expected an address to listen on: {os.strerror(errno.EADDRINUSE)}\n" in said
+        message = refused("akwanga", "--tcp", "127.0.0.1:0", "--tcp", address, "--pty", str(link))
+    assert f"--tcp {address}: expected an address to listen on: {os.strerror(errno.EADDRINUSE)}\n" in message
     assert not os.path.lexists(link)

@@ -1,4 +1,4 @@
-"""Served serial lines (issue 5): pseudo-terminals, RFC 2217, lines as slow as a wire, lines that fail on request."""
+"""Served serial lines (issue 5): pseudo-terminals, RFC 2217, paced lines, transmission errors on request."""
 
 import os
 import threading
@@ -54,20 +54,20 @@ def test_a_terminal_is_a_serial_port_in_raw_mode(terminal, link):
         assert client.errors() == ['-101,"Invalid character;character number 3"']
 
 
-def test_every_byte_of_a_block_comes_through_a_terminal(link):
-    door = with_model()
-    expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
-    with ServerThread(door.instrument, endpoints=Endpoints(pty=[link])) as served, at(served) as port:
+def test_a_terminal_transmits_every_byte_of_a_block(link):
+    model_session = with_model()
+    expected = model_session.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
+    with ServerThread(model_session.instrument, endpoints=Endpoints(pty=[link])) as served, at(served) as port:
         assert Client(port).block("EYEP1:PICT? 60,50,4") == expected
 
 
-def test_clients_of_a_terminal_come_and_go(terminal):
+def test_a_terminal_serves_several_clients_in_succession(terminal):
     for n in range(5):
         with at(terminal) as port:
             assert Client(port).ask(f"*ESE {n};*ESE?") == str(n)
 
 
-def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
+def test_the_link_is_removed_with_the_server_and_an_old_one_is_replaced(link):
     near, far = os.openpty()
     link.symlink_to(os.ttyname(far))
     with ServerThread(endpoints=Endpoints(pty=[link])) as served:
@@ -77,7 +77,7 @@ def test_the_link_goes_with_the_server_and_an_old_one_is_replaced(link):
 
 
 @pytest.mark.parametrize("make", [lambda path: path.write_text("mine"), Path.mkdir, lambda path: path.symlink_to("x")])
-def test_what_is_no_link_to_a_terminal_is_left_alone(link, make):
+def test_a_path_that_is_no_link_to_a_terminal_is_not_changed(link, make):
     make(link)
     with (
         pytest.raises(A7SimError, match="expected nothing there or an old link"),
@@ -88,14 +88,14 @@ def test_what_is_no_link_to_a_terminal_is_left_alone(link, make):
     assert [path.name for path in link.parent.iterdir()] == ["a7"]
 
 
-def test_a_link_that_now_leads_elsewhere_is_left_alone(link):
+def test_a_link_with_a_new_target_is_not_removed(link):
     with ServerThread(endpoints=Endpoints(pty=[link])):
         link.unlink()
         link.symlink_to("/dev/pts/elsewhere")
     assert str(link.readlink()) == "/dev/pts/elsewhere"
 
 
-def test_a_folder_that_is_not_there_is_said_and_every_other_door_is_closed_again(tmp_path):
+def test_a_missing_folder_is_reported_and_every_other_endpoint_is_closed(tmp_path):
     first = tmp_path / "first"
     with (
         pytest.raises(A7SimError, match=r"nowhere/a7: expected a place where a link can be made"),
@@ -105,7 +105,7 @@ def test_a_folder_that_is_not_there_is_said_and_every_other_door_is_closed_again
     assert not first.is_symlink()
 
 
-def test_a_terminal_whose_client_does_not_read_begins_anew(link):
+def test_a_terminal_whose_client_does_not_read_is_reset(link):
     with ServerThread(
         limits=ServerLimits(write_timeout=0.2), endpoints=Endpoints(pty=[link], tcp=[ANY_PORT])
     ) as served:
@@ -122,7 +122,7 @@ def test_a_terminal_whose_client_does_not_read_begins_anew(link):
 
 
 def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
-    """More than is kept for a client: it is heard no further until it has read, and nothing is lost."""
+    """Above the limit of the buffer no further line is read until the client has read; nothing is lost."""
     count = 3 * MAX_UNREAD // len(IDENTITY)
     with ServerThread(endpoints=Endpoints(pty=[link])) as served, at(served) as port:
         sender = threading.Thread(target=port.write, args=(b"*IDN?\n" * count,))
@@ -133,7 +133,7 @@ def test_a_terminal_whose_client_reads_late_gets_every_reply_in_order(link):
         assert not served.server._terminals[0]._write_blocked
 
 
-def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
+def test_an_idle_terminal_releases_its_lock_and_stays_open(link):
     with ServerThread(limits=ServerLimits(idle_timeout=0.2), endpoints=Endpoints(pty=[link])) as served:
         with at(served) as port:
             assert Client(port).ask("SYST:LOCK:REQ?") == "1"
@@ -146,11 +146,11 @@ def test_a_terminal_long_silent_frees_its_lock_and_stays(link):
 # --- RFC 2217 ------------------------------------------------------------------------------------------
 
 
-def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well():
-    door = with_model()
-    expected = door.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
+def test_a_port_over_rfc_2217_transmits_every_byte_and_accepts_cr_as_line_end():
+    model_session = with_model()
+    expected = model_session.feed(b"EYEP1:PICT? 60,50,4\n").removesuffix(b"\n")[len(b"#43000") :]
     assert expected.count(b"\xff") > 0
-    with ServerThread(door.instrument, endpoints=Endpoints(rfc2217=[ANY_PORT])) as served, at(served) as port:
+    with ServerThread(model_session.instrument, endpoints=Endpoints(rfc2217=[ANY_PORT])) as served, at(served) as port:
         client = Client(port)
         assert client.block("EYEP1:PICT? 60,50,4") == expected
         port.write(b"*TST?\r")
@@ -162,11 +162,11 @@ def test_a_port_over_rfc_2217_carries_every_byte_and_ends_lines_with_cr_as_well(
         assert client.errors() == ['-101,"Invalid character;character number 255"']
 
 
-# --- as slow as a wire ---------------------------------------------------------------------------------
+# --- paced lines -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["tcp", "pty"])
-def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, kind):
+def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_delays_no_other_client(link, kind):
     baud, asked = 2400, 3
     endpoints = Endpoints(tcp=[ANY_PORT], pty=[link])
     with ServerThread(limits=ServerLimits(baud=baud), endpoints=endpoints) as served:
@@ -186,7 +186,7 @@ def test_a_paced_line_needs_ten_bits_a_byte_both_ways_and_holds_up_nobody(link, 
     assert wire * 0.95 <= took <= wire * 1.6 + 0.3
 
 
-def test_a_paced_line_keeps_little_and_loses_nothing():
+def test_a_paced_line_loses_no_reply():
     with ServerThread(limits=ServerLimits(baud=2_000_000)) as served:
         line = served.line()
         sender = threading.Thread(target=line.send, args=(b"COUN:X?\n" * 5000,))
@@ -195,7 +195,7 @@ def test_a_paced_line_keeps_little_and_loses_nothing():
         sender.join()
 
 
-def test_a_paced_client_that_hangs_up_its_half_is_answered_to_the_end():
+def test_a_paced_client_that_closes_its_sending_half_gets_all_replies():
     with ServerThread(limits=ServerLimits(baud=19200)) as served:
         line = served.line()
         line.send(b"*TST?\n" * 50)
@@ -213,26 +213,26 @@ def faulty(spec, seed=1, baud=None):
     )
 
 
-def replies_lost(seed, count=400):
+def remaining_replies(seed, count=400):
     with faulty("drop-reply:0.25", seed) as served:
         line = served.line()
         for n in range(count):
             line.send(f"*ESE {n % 256};*ESE?\n".encode())
         line.socket.shutdown(1)
-        came = []
+        received = []
         while reply := line.read():
-            came.append(int(reply))
-    return came
+            received.append(int(reply))
+    return received
 
 
-def test_replies_are_dropped_as_often_as_asked_and_the_same_ones_again():
-    came = replies_lost(seed=1)
-    assert 0.65 < len(came) / 400 < 0.85
-    assert came == replies_lost(seed=1)
-    assert came != replies_lost(seed=2)
+def test_replies_are_dropped_at_the_given_rate_and_a_seed_drops_the_same_ones():
+    received = remaining_replies(seed=1)
+    assert 0.65 < len(received) / 400 < 0.85
+    assert received == remaining_replies(seed=1)
+    assert received != remaining_replies(seed=2)
 
 
-def test_replies_are_late_by_the_delay_and_in_order():
+def test_replies_are_delayed_and_stay_in_order():
     with faulty("delay:80ms") as served:
         line = served.line()
         began = time.monotonic()
@@ -241,16 +241,16 @@ def test_replies_are_late_by_the_delay_and_in_order():
         assert 0.08 <= time.monotonic() - began < 2.0
 
 
-def test_bytes_are_garbled_as_often_as_asked_and_line_ends_spared():
+def test_bytes_are_garbled_at_the_given_rate_and_line_ends_are_not():
     reply = bytes(range(32, 127)) * 100 + b"\n"
     noise = FaultInjector(FaultRates(garble=0.02), np.random.default_rng(3))
-    came = [noise.apply(reply) for _ in range(10)]
-    wrong = sum(a != b for each in came for a, b in zip(each, reply, strict=True))
+    received = [noise.apply(reply) for _ in range(10)]
+    wrong = sum(a != b for each in received for a, b in zip(each, reply, strict=True))
     assert 0.015 < wrong / (10 * len(reply)) < 0.025
-    assert all(each[-1:] == b"\n" for each in came)
+    assert all(each[-1:] == b"\n" for each in received)
 
 
-def test_a_line_that_is_cut_takes_its_client_and_nobody_else():
+def test_a_disconnection_affects_only_its_client():
     with faulty("disconnect:0.2") as served:
         answered = []
         for _ in range(100):
@@ -261,12 +261,12 @@ def test_a_line_that_is_cut_takes_its_client_and_nobody_else():
         assert served.until(lambda: served.server.clients == sum(answered))
 
 
-def test_a_cut_is_an_end_not_a_reply():
+def test_a_disconnection_gives_an_error_and_no_reply():
     with pytest.raises(ConnectionDropped):
         FaultInjector(FaultRates(disconnect=1.0), np.random.default_rng(0)).apply(b"0\n")
 
 
-def test_faults_read_as_they_are_written():
+def test_faults_are_parsed():
     assert parse_faults("drop-reply:0.01,delay:50ms,garble:0.001,disconnect:0.0005") == FaultRates(
         0.01, 0.001, 0.0005, 0.05
     )
@@ -286,6 +286,6 @@ def test_faults_read_as_they_are_written():
         ("garble:0.1,garble:0.2", "expected garble once"),
     ],
 )
-def test_faults_that_cannot_be_read_are_said(spec, sentence):
+def test_the_error_message_for_wrong_faults_names_the_expected_form(spec, sentence):
     with pytest.raises(A7SimError, match=sentence.replace("(", r"\(")):
         parse_faults(spec)

@@ -1,4 +1,4 @@
-"""One procedure, two benches: a crowd of sessions gives to the digit what each gives over its line."""
+"""One procedure, two drivers: a batch of sessions gives the digits of each session over its link."""
 
 import msgspec
 import pytest
@@ -21,18 +21,18 @@ OUT_OF_TRUE = Condition(
 
 
 def same_to_the_digit(scenario, seeds=SEEDS, all_finish=False, looked_at=None):
-    """Whether every number that an operator read or set is the same over the line and in the crowd.
+    """Return whether every number read or set is the same over the link and in the batch.
 
-    Of all sessions of the crowd, or of those with seeds that are looked at.
+    Compared are all sessions of the batch, or only those with the seeds `looked_at`.
     """
-    crowd, same = same_as_alone(scenario, seeds, looked_at or seeds)
+    batch, same = same_as_alone(scenario, seeds, looked_at or seeds)
     if all_finish:
-        assert crowd.workstation.operators.reasons == {}
+        assert batch.workstation.operators.reasons == {}
     return same
 
 
 def same_as_alone(scenario, seeds, looked_at):
-    """A crowd that has worked, and whether those of it that are looked at read and set what each does alone."""
+    """Return a batch that has run and whether its sessions `looked_at` give the digits of single sessions."""
     batch = open_batch(scenario, seeds)
     records = list(batch.measure_models())
     if not batch.workstation.operators.reasons:
@@ -40,8 +40,8 @@ def same_as_alone(scenario, seeds, looked_at):
     return batch, all(_same(batch, records, seeds.index(seed), seed) for seed in looked_at)
 
 
-def _same(crowd, records, session, seed):
-    alone = open_session(crowd.scenario, seed)
+def _same(batch, records, session, seed):
+    alone = open_session(batch.scenario, seed)
     done, why = [], None
     try:
         for record in measure_models(alone.person, alone.job):
@@ -50,7 +50,7 @@ def _same(crowd, records, session, seed):
         why = str(error)
     among_others = [each.for_session(session) for each in records if session in each.sessions]
     return (
-        crowd.workstation.operators.reasons.get(session) == why
+        batch.workstation.operators.reasons.get(session) == why
         and [read_and_set(each) for each in done] == [read_and_set(each) for each in among_others]
         and all(
             computed(one) == pytest.approx(computed(other), abs=1e-6)
@@ -60,14 +60,14 @@ def _same(crowd, records, session, seed):
 
 
 def read_and_set(record):
-    """What stands on counters, and the time."""
+    """Return the readings of counters and the time."""
     set_in_rounds = [each.settings for each in record.orientation.rounds]
     principal_distances = [each.principal_distance for each in record.interior.values()]
     return record.orientation.elements, set_in_rounds, principal_distances, record.points, record.finished_at
 
 
 def computed(record):
-    """What was computed from readings: the same but for the last bits of a sum."""
+    """Return numbers computed from readings: they differ at most in the last bits of a sum."""
     centres = [getattr(record.centres[hand], name) for hand in (1, 2) for name in ("X0", "Y0", "Z0", "T0", "rms")]
     rounds = [value for each in record.orientation.rounds for value in (each.mean, each.rms, *each.sigmas.values())]
     residuals = list(record.orientation.residuals.values())
@@ -111,14 +111,14 @@ SCENARIOS = {
 
 
 BOTH_MODELS = ("as it stands",)
-"""Worked to the end; the others set up their first model only."""
+"""Scenarios with both models; the others have only their first model."""
 
 READ_AGAIN = ("many slips",)
-"""Whose parallaxes are read three times; the others', which differ in something else, once."""
+"""Scenarios whose parallaxes are read three times; in the others they are read once."""
 
 
 @pytest.mark.parametrize("name", list(SCENARIOS))
-def test_a_crowd_reads_and_sets_what_each_would_alone(name):
+def test_a_batch_gives_the_same_digits_as_each_session_over_the_link(name):
     scenario = SCENARIOS[name]
     if name == "out of true":
         instrument = msgspec.structs.replace(scenario.instrument, condition=OUT_OF_TRUE)
@@ -130,27 +130,27 @@ def test_a_crowd_reads_and_sets_what_each_would_alone(name):
     assert same_to_the_digit(scenario, all_finish=True, looked_at=SEEDS if name == "as it stands" else SEEDS[1:])
 
 
-def test_a_bench_that_is_off_by_a_count_is_found_out(monkeypatch):
-    """The comparison can fail: a counter of the crowd that shows a hundredth too much gives other numbers."""
-    truly = BatchDriver.elements
+def test_a_batch_driver_that_is_off_by_one_count_is_detected(monkeypatch):
+    """The comparison can fail: a counter of the batch that shows one hundredth more gives other numbers."""
+    true_method = BatchDriver.elements
 
-    def a_count_too_much(self, active, names):
-        return {name: counts + 0.01 * (name == "by1") for name, counts in truly(self, active, names).items()}
+    def one_count_more(self, active, names):
+        return {name: counts + 0.01 * (name == "by1") for name, counts in true_method(self, active, names).items()}
 
-    monkeypatch.setattr(BatchDriver, "elements", a_count_too_much)
+    monkeypatch.setattr(BatchDriver, "elements", one_count_more)
     scenario = read_once(SCENARIOS["as it stands"])
     assert not same_to_the_digit(msgspec.structs.replace(scenario, models=scenario.models[:1]), SEEDS[:1])
 
 
 @pytest.fixture(scope="module")
-def by_itself():
-    """The document of a crowd of one, with seed 3."""
+def batch_of_one():
+    """Return the document of a batch of one session, with seed 3."""
     (document,) = open_batch(read_once(SCENARIOS["as it stands"]), [3]).run()
     return document
 
 
-def test_documents_are_those_of_a_run_without_its_line(by_itself):
-    document = by_itself
+def test_the_document_of_a_batch_equals_that_of_a_run_without_its_link(batch_of_one):
+    document = batch_of_one
     alone = run(read_once(SCENARIOS["as it stands"]), 3)
     assert document["models"] == alone["models"]
     assert document["status"] == "complete"
@@ -162,18 +162,18 @@ def test_documents_are_those_of_a_run_without_its_line(by_itself):
     ("setting", "value"),
     [("photos.1.laid", '"upside down"'), ("plan.tolerated_parallax_um", "0.01")],
 )
-def test_who_gives_up_says_why_and_is_left_behind(setting, value):
-    crowd, same = same_as_alone(read_once(load_scenario("akwanga", {setting: value})), SEEDS, SEEDS)
+def test_an_operator_that_gives_up_has_a_reason_and_becomes_inactive(setting, value):
+    batch, same = same_as_alone(read_once(load_scenario("akwanga", {setting: value})), SEEDS, SEEDS)
     assert same
-    assert set(crowd.workstation.operators.reasons) == {0, 1}
+    assert set(batch.workstation.operators.reasons) == {0, 1}
 
 
-def test_sessions_do_not_disturb_each_other(by_itself):
-    """A session gives the same numbers whoever else sits in the hall, also beside one who gives up."""
+def test_a_session_does_not_depend_on_the_other_sessions_of_its_batch(batch_of_one):
+    """A session gives the same numbers in every batch, also beside a session that gives up."""
     scenario = read_once(SCENARIOS["as it stands"])
     strict = msgspec.structs.replace(
         scenario, plotting=msgspec.structs.replace(scenario.plan, tolerated_centre_rms=0.19)
     )
     given_up, among_others, *_ = open_batch(strict, [14, 3, 11]).run()
     assert given_up["status"] == "does not fit"
-    assert by_itself == among_others
+    assert batch_of_one == among_others

@@ -1,4 +1,4 @@
-"""The state of an instrument is all of it (issue 6): restored, it goes on as the one that it was taken from."""
+"""The state of an instrument is complete (issue 6): the restored instrument continues as the original."""
 
 import json
 import random
@@ -50,8 +50,8 @@ def worn(name, token=None):
 
 @pytest.mark.parametrize("name", list(LINES))
 @pytest.mark.parametrize("seed", range(4))
-def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name, seed):
-    """A worn one, whose dice fall at every setting, with two clients in the midst of their work."""
+def test_a_restored_instrument_continues_as_the_original(name, seed):
+    """The instrument is worn, draws random numbers at every setting and has two busy clients."""
     dice = random.Random(seed)
     instrument, clock = worn(name, "sesame"), Clock()
     engines = [instrument.open(), instrument.open()]
@@ -66,16 +66,16 @@ def test_an_instrument_restored_goes_on_as_the_one_its_state_was_taken_from(name
     assert json.loads(json.dumps(again.state())) == state
     later = Clock(clock.now)
     for _ in range(60):
-        client, said = dice.choice(engines).client, line(dice, name)
-        expected = feed_until_idle(instrument.clients[client], said, clock)
-        assert feed_until_idle(again.clients[client], said, later) == expected
+        client, sent = dice.choice(engines).client, line(dice, name)
+        expected = feed_until_idle(instrument.clients[client], sent, clock)
+        assert feed_until_idle(again.clients[client], sent, later) == expected
     assert clock.now == later.now
     assert instrument.state(changes) == again.state(changes)
     assert len(instrument.state(changes)["autograph"]["registered"]) < len(instrument.autograph.recorder.changes)
     assert again.open().client == "client3"
 
 
-def test_states_that_are_not_what_their_hash_says_are_not_believed(tmp_path):
+def test_states_that_do_not_match_their_hash_are_ignored(tmp_path):
     states = [{"a": 1, "b": [1.5]}, {"a": 2, "b": [1.5]}]
     kept = [Checkpoint(n, 1.0, state_hash(state), state) for n, state in enumerate(states)]
     (tmp_path / "states").write_bytes(to_lines(kept))
@@ -88,7 +88,7 @@ def test_states_that_are_not_what_their_hash_says_are_not_believed(tmp_path):
     assert list(read_checkpoints(tmp_path / "nowhere")) == []
 
 
-def test_differences_are_named_by_their_place():
+def test_differences_are_reported_with_their_part():
     was, is_now = {"x": {"at": 1.0, "of": [1]}, "y": 2}, {"x": {"at": 1.5, "of": [1]}, "z": 3}
     assert [(each.part, each.before, each.after) for each in differences(was, is_now)] == [
         ("x.at", 1.0, 1.5),

@@ -11,10 +11,10 @@ from tests.support.links import new_instrument, serve_on_all_links
 from tests.test_language import EXAMPLES, NOT_ON_AN_A7, in_full, in_short
 
 BLOCKS = {"EYEPiece<n>:PICTure?"}
-"""Queries whose answers may hold line ends; they are asked apart."""
+"""Queries whose answers may contain line ends; they are sent separately."""
 
 AFTER = {"PHOTo<n>:UNLoad": ['PHOT2:LOAD "102"', "PHOT2?"], "SYSTem:LOCK:RELease": ["SYST:LOCK:REQ?"]}
-"""What has to follow a line, or the next ones would have nothing to answer."""
+"""Lines that must follow a line so that the next ones have an answer."""
 
 PICTURE = "EYEP1:PICT? 64,48,2"
 
@@ -97,15 +97,15 @@ CLIENTS = {
 
 
 def conversation(client):
-    """Return every line of the script with its answer, and the picture behind it."""
+    """Return every line of the script with its answer, and the picture after it."""
     query, write, picture = client
-    answers = [(line, query(line) if asks(line) else write(line) and None) for line in SCRIPT]
+    answers = [(line, query(line) if is_query(line) else write(line) and None) for line in SCRIPT]
     for line in MODEL_1:
         write(line)
     return answers, picture(PICTURE), query("SYST:ERR:COUN?;NEXT?;NEXT?;NEXT?;NEXT?;NEXT?")
 
 
-def asks(line):
+def is_query(line):
     return "?" in line
 
 
@@ -118,7 +118,7 @@ def first():
 def test_the_script_has_200_lines_or_more_and_every_query_of_it_is_answered(first):
     answers, picture, errors = first
     assert len(SCRIPT) >= 200
-    assert all(answer for line, answer in answers if asks(line))
+    assert all(answer for line, answer in answers if is_query(line))
     assert len(picture) == 64 * 48
     assert errors.startswith('5;-221,"Settings conflict;')
     assert dict(answers)["PROJ1:KAPP?;PHI?;OMEG?;:BASE:BX?;MODE?"].startswith("5.00;99.00;")

@@ -63,7 +63,7 @@ def test_similarity_is_dewitts_with_its_standard_deviations(reference, solved):
 
 
 @given(SEEDS)
-def test_any_similarity_comes_back_either_way(seed):
+def test_any_similarity_is_recovered_in_both_directions(seed):
     rng = np.random.default_rng(seed)
     points = rng.standard_normal((3, int(rng.integers(3, 9)))) * 100.0
     turn, scale, shift = any_rotation(rng), 10.0 ** rng.uniform(-3, 3), rng.standard_normal(3) * 1000.0
@@ -113,14 +113,14 @@ def test_s0_is_that_of_the_weighted_residuals_computed_minus_given(solved):
     assert found.s0 == pytest.approx(np.sqrt((weights * residuals**2).sum() / (3 * 8 - 7)), rel=1e-9)
 
 
-def test_a_model_upside_down_is_turned_over():
+def test_a_model_upside_down_is_rotated():
     points = np.array([[0, 0, -1], [1, 0, 0], [0, 2, 0], [3, 3, 1.0]]).T
     targets = np.diag([1.0, -1.0, -1.0]) @ points
     np.testing.assert_allclose(similarity_by_iteration(points, targets).rotation, np.diag([1, -1, -1]), atol=1e-9)
 
 
 @pytest.mark.parametrize("solved", [similarity_by_iteration, similarity_by_quaternion])
-def test_two_points_or_points_in_a_line_make_no_similarity(solved):
+def test_two_points_or_points_in_a_line_determine_no_similarity(solved):
     line = np.array([[0, 0, 0], [1, 2, 3], [2, 4, 6.0], [3, 6, 9]]).T
     for points in (line, line[:, :2], line[:, :1], np.zeros((3, 4))):
         with pytest.raises(Undetermined):
@@ -131,7 +131,7 @@ def test_two_points_or_points_in_a_line_make_no_similarity(solved):
         solved(np.zeros((3, 4)), line)
 
 
-def test_one_point_of_each_member_goes_as_it_goes_among_others():
+def test_one_point_of_each_member_is_transformed_as_among_others():
     rng = np.random.default_rng(9)
     points, targets = rng.standard_normal((2, 3, 5, 4))
     for found, one in (
@@ -142,7 +142,7 @@ def test_one_point_of_each_member_goes_as_it_goes_among_others():
 
 
 @pytest.mark.parametrize("solved", [similarity_by_iteration, similarity_by_quaternion])
-def test_one_set_of_points_is_laid_on_each_of_many_and_many_on_one(solved):
+def test_one_set_of_points_is_fitted_to_each_of_many_and_many_to_one(solved):
     rng = np.random.default_rng(10)
     one = rng.standard_normal((3, 5))
     many = np.einsum("ijm,jn->inm", any_rotation(rng, 2), one) + 0.1 * rng.standard_normal((3, 5, 2))
@@ -154,7 +154,7 @@ def test_one_set_of_points_is_laid_on_each_of_many_and_many_on_one(solved):
             np.testing.assert_allclose(together.scale[i], alone.scale, rtol=1e-8)
 
 
-def test_an_iteration_that_does_not_come_to_rest_says_so():
+def test_an_iteration_that_does_not_converge_is_reported():
     rng = np.random.default_rng(10)
     points, targets = rng.standard_normal((3, 5)), rng.standard_normal((3, 5, 2))
     with pytest.raises(Undetermined, match="the similarity of 5 points does not converge in 100 iterations"):
@@ -162,7 +162,7 @@ def test_an_iteration_that_does_not_come_to_rest_says_so():
 
 
 def test_the_iteration_ends_at_the_best_attitude_wherever_it_starts():
-    """Half a turn from the best the normal equations are at rest, too, where they are not to stay."""
+    """Half a turn from the best attitude the normal equations are stationary, and the iteration must not stop there."""
     points = np.array([[3.0, 0, 0], [-3, 0, 0], [0, 2, 0], [0, -2, 0], [0, 0, 1], [0, 0, -1]]).T
     turn = rotation(0.3, -0.2, 1.1)
     half_turns = [np.diag(signs) for signs in ((1.0, -1.0, -1.0), (-1.0, 1.0, -1.0), (-1.0, -1.0, 1.0))]
@@ -234,7 +234,7 @@ def wuhan(reference, oriented):
 
 
 @pytest.mark.parametrize(("oriented", "digits"), [(sampson, 6e-10), (coplanar, 2e-7)])
-def test_two_real_strips_come_to_the_ground_with_the_residuals_listed(reference, oriented, digits):
+def test_two_real_strips_are_oriented_with_the_residuals_listed(reference, oriented, digits):
     expected, strips, ground = wuhan(reference, oriented)
     for number, models in strips.items():
         strip = formed_strip(models)
@@ -247,7 +247,7 @@ def test_two_real_strips_come_to_the_ground_with_the_residuals_listed(reference,
         assert all(text.startswith("ground points that the model has not") for text in found.warnings)
 
 
-def test_north_given_for_east_is_warned_of(reference):
+def test_north_given_for_east_gives_a_warning(reference):
     _, strips, ground = wuhan(reference, coplanar)
     swapped = Ground(ground.points, ground.coordinates[[1, 0, 2]], ground.roles)
     for models in strips.values():
@@ -338,7 +338,7 @@ def test_schuts_theoretical_strip_returns_its_ground_coordinates_to_a_millimetre
 
 @examples(30)
 @given(SEEDS)
-def test_any_strip_without_errors_comes_back_whatever_the_order(seed):
+def test_any_strip_without_errors_is_recovered_in_any_order(seed):
     rng = np.random.default_rng(seed)
     points, centres = flight(rng, photographs=int(rng.integers(2, 8)))
     last = len(centres) - 1
@@ -393,7 +393,7 @@ def test_tie_points_are_averaged_and_deviations_come_in_pairs():
         np.testing.assert_allclose(second[:, b], difference / 2.0, atol=1e-12)
 
 
-def test_models_that_make_no_strip_are_refused():
+def test_models_that_form_no_strip_are_rejected():
     rng = np.random.default_rng(3)
     points, centres = flight(rng, photographs=5)
     models = perfect_models(rng, points, centres)
@@ -436,9 +436,9 @@ def having(name, *centres):
     ids=["a branch", "a ring"],
 )
 def test_a_branch_or_a_ring_is_no_strip(models, sentence):
-    with pytest.raises(A7SimError) as told:
+    with pytest.raises(A7SimError) as raised:
         in_order(models)
-    assert str(told.value) == sentence
+    assert str(raised.value) == sentence
 
 
 def test_models_joined_at_a_centre_have_one_in_common_and_points_below_it():
@@ -471,7 +471,7 @@ def tilted_model(rng, points):
     return Model("m", names, local)
 
 
-def test_too_little_control_and_control_in_a_line_are_refused():
+def test_too_little_control_and_control_in_a_line_are_rejected():
     rng = np.random.default_rng(4)
     points, _ = flight(rng, photographs=4)
     model = tilted_model(rng, points)
@@ -483,7 +483,7 @@ def test_too_little_control_and_control_in_a_line_are_refused():
         absolute_orientation(tilted_model(rng, line), grounded(line, lambda name: "control"))
 
 
-def test_control_nearly_in_a_line_is_warned_of():
+def test_control_nearly_in_a_line_gives_a_warning():
     rng = np.random.default_rng(4)
     points, _ = flight(rng, photographs=6, relief=50.0)
     points = {name: place * (1.0, 0.02, 1.0) for name, place in points.items()}
@@ -493,7 +493,7 @@ def test_control_nearly_in_a_line_is_warned_of():
 
 
 @pytest.mark.parametrize("partial", [False, True])
-def test_left_handed_axes_are_warned_of_with_and_without_centres(partial):
+def test_left_handed_axes_give_a_warning_with_and_without_centres(partial):
     rng = np.random.default_rng(7)
     points, centres = flight(rng, photographs=4)
     roles = {"0a": "control", "3c": "plan", "3a": "height", "1c": "height"}
@@ -504,8 +504,8 @@ def test_left_handed_axes_are_warned_of_with_and_without_centres(partial):
         assert any("left-handed" in text for text in absolute_orientation(model, swapped).warnings)
 
 
-def test_three_points_of_control_tell_left_handed_axes_by_the_model_upside_down():
-    """A triangle and its mirror image fit alike: only what is up and what is down can tell."""
+def test_three_points_of_control_detect_left_handed_axes_by_the_model_upside_down():
+    """A triangle and its mirror image fit alike: only the vertical direction distinguishes them."""
     points = {"1": [0.0, 0.0, 100.0], "2": [3000.0, 0.0, 120.0], "3": [0.0, 2000.0, 90.0]}
     points = {name: np.array(place) for name, place in points.items()}
     model, ground = tilted_model(np.random.default_rng(1), points), grounded(points, lambda name: "control")
@@ -516,8 +516,8 @@ def test_three_points_of_control_tell_left_handed_axes_by_the_model_upside_down(
     assert "the model comes out upside down, its heights inverted" in warning
 
 
-def test_control_that_is_whole_gives_the_attitude_to_what_is_used_besides():
-    """A model that stands on its side comes to rest, too, where heights and plan alone stand beside three points."""
+def test_full_control_points_give_the_attitude_for_partial_ones():
+    """The iteration also converges for a model on its side with three full points, heights and plan points."""
     rng = np.random.default_rng(12)
     points, _ = flight(rng, photographs=4)
     model = tilted_model(rng, points)
@@ -527,7 +527,7 @@ def test_control_that_is_whole_gives_the_attitude_to_what_is_used_besides():
     assert np.nanmax(np.abs(found.fit.residuals)) < 1e-6
 
 
-def test_one_model_of_a_batch_is_warned_of_as_if_it_were_alone():
+def test_one_model_of_a_batch_gives_the_same_warning_as_alone():
     rng = np.random.default_rng(7)
     points, _ = flight(rng, photographs=4)
     ground = grounded(points, lambda name: "control")
@@ -540,12 +540,12 @@ def test_one_model_of_a_batch_is_warned_of_as_if_it_were_alone():
         assert absolute_orientation(both, ground).warnings == alone
 
 
-def test_the_largest_residual_is_of_those_there_are():
+def test_the_largest_residual_ignores_missing_residuals():
     residuals = np.array([[1.0, np.nan, -3.0], [np.nan, np.nan, np.nan], [0.5, 0.25, 0.0]])
     np.testing.assert_array_equal(max_abs_residual(residuals), [3.0, np.nan, 0.5])
 
 
-def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():
+def test_ground_points_missing_in_the_model_are_named_and_wrong_roles_are_rejected():
     rng = np.random.default_rng(7)
     points, _ = flight(rng, photographs=3)
     more = {**points, "77z": np.zeros(3)}
@@ -566,7 +566,7 @@ def test_ground_points_the_model_has_not_are_named_and_wrong_roles_refused():
 
 @examples(50)
 @given(SEEDS, st.sampled_from([2, 3]), st.booleans())
-def test_any_polynomial_deformation_comes_back(seed, degree, batch):
+def test_any_polynomial_deformation_is_recovered(seed, degree, batch):
     rng = np.random.default_rng(seed)
     shape = (2,) if batch else ()
     x, y = np.meshgrid(np.linspace(0.0, 40_000.0, 9), [-2500.0, 0.0, 2500.0])
@@ -644,7 +644,7 @@ def test_control_of_three_bands_leaves_residuals_of_the_size_of_the_nrc_strip(re
     assert (found > printed / 2.0).all()
 
 
-def test_three_bands_of_control_do_not_carry_the_third_degree():
+def test_three_bands_of_control_do_not_determine_the_third_degree():
     x, y = np.meshgrid([0.0, 1000.0, 2000.0], [-300.0, 0.0, 300.0])
     places = np.array([x.ravel(), y.ravel(), np.zeros(9)])
     names = tuple(str(i) for i in range(9))
@@ -686,7 +686,7 @@ def block_of(rng, along, strips, noise=0.0):
 
 @examples(20)
 @given(SEEDS)
-def test_a_block_without_errors_comes_back_whatever_the_order(seed):
+def test_a_block_without_errors_is_recovered_in_any_order(seed):
     rng = np.random.default_rng(seed)
     models, ground = block_of(rng, 4, 2)
     found = block_adjustment([models[i] for i in rng.permutation(len(models))], ground)
@@ -722,7 +722,7 @@ def test_one_model_as_a_block_is_its_absolute_orientation():
     assert block.sigmas[0, 0] == pytest.approx(float(alone.similarity.sigma_scale), rel=1e-6)
 
 
-def test_blocks_that_hang_loose_are_refused():
+def test_blocks_without_sufficient_connections_are_rejected():
     rng = np.random.default_rng(2)
     models, ground = block_of(rng, 3, 1)
     only = Ground(ground.points, ground.coordinates, ("check",) * len(ground.points))
@@ -756,11 +756,11 @@ def test_five_hundred_models_are_adjusted_together():
     assert found.s0 == pytest.approx(0.04, rel=0.05)
 
 
-def test_the_block_alone_loads_scipy():
+def test_only_the_block_adjustment_imports_scipy():
     code = "import sys; import a7sim.reduction.block, a7sim.reduction.cards; print('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
-def test_centres_are_known_by_their_names():
+def test_centres_are_recognised_by_their_names():
     assert is_centre("321:centre")
     assert not is_centre("321")

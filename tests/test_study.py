@@ -1,4 +1,4 @@
-"""Studies: what a file may say, replicates that do not depend on how they are worked, statistics and the command."""
+"""Studies: keys of the file, replicates that do not depend on the executor, statistics and the command."""
 
 import numpy as np
 import pytest
@@ -55,14 +55,14 @@ def test_a_latin_hypercube_has_one_cell_in_every_tenth_of_every_range():
         assert tenths == list(range(10))
 
 
-def test_settings_of_a_cell_reach_its_scenario_and_leave_the_others_alone(tmp_path):
+def test_settings_of_a_cell_change_only_its_scenario(tmp_path):
     one, four = laid(tmp_path).scenarios
     assert (one.comparator.pointings, four.comparator.pointings) == (1, 4)
     assert one.work == four.work == ["comparator"]
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for shelf in SEARCH_PATH for path in shelf.glob("*.toml")))
-def test_every_study_that_comes_with_a7sim_can_be_laid_out(name):
+def test_every_shipped_study_can_be_loaded(name):
     assert len(load_study(name).cells) > 1
 
 
@@ -85,9 +85,7 @@ def by_comparator(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("kind", "largest_chunk"), [("process", 1), ("process", 4), ("pool", 2)])
-def test_a_study_gives_the_same_bytes_however_it_is_cut_and_whoever_works_it(
-    by_comparator, tmp_path, kind, largest_chunk
-):
+def test_a_study_gives_the_same_bytes_for_any_chunk_size_and_executor(by_comparator, tmp_path, kind, largest_chunk):
     study, tally = by_comparator
     assert bytes_of(numbers_of(study, kind, largest_chunk), tmp_path) == bytes_of(tally, tmp_path)
 
@@ -109,7 +107,7 @@ def test_a_study_ends_when_its_precision_is_reached_or_its_replicates_are_done(
     assert numbers_of(laid(tmp_path, precision=wanted, replicates=5)).done.tolist() == [replicates] * 2
 
 
-def test_a_response_that_the_results_do_not_have_is_a_mistake_that_names_its_place(tmp_path):
+def test_the_error_message_for_a_response_missing_in_the_results_names_its_place(tmp_path):
     with pytest.raises(A7SimError, match=r"at ways there are comparator, not 'A8'"):
         numbers_of(laid(tmp_path, responses=["ways.A8.accuracy_m.checks.plan"]))
 
@@ -193,14 +191,14 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", list(MISTAKES))
-def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
+def test_the_error_message_for_a_mistake_is_one_sentence_and_names_its_place(tmp_path, name):
     changes, words = MISTAKES[name]
     (tmp_path / "study.toml").write_text('responses = ["hours"]')
-    with pytest.raises(A7SimError) as told:
+    with pytest.raises(A7SimError) as raised:
         laid(tmp_path, **changes) if "photos" not in changes else build_study(changes, tmp_path)
-    assert words in str(told.value)
-    assert str(told.value).startswith("study: ")
-    assert len(str(told.value).splitlines()) == 1
+    assert words in str(raised.value)
+    assert str(raised.value).startswith("study: ")
+    assert len(str(raised.value).splitlines()) == 1
 
 
 @pytest.mark.parametrize(
@@ -212,8 +210,8 @@ def test_a_mistake_gets_one_sentence_that_names_its_place(tmp_path, name):
         (0.0, 3.0, range(1, 8)),
     ],
 )
-def test_chunks_are_as_large_as_pays(opening, each, settled):
-    """Rule: what costs much to open is worked long, to a limit; what costs nothing, for about twenty seconds."""
+def test_chunk_sizes_balance_opening_and_running(opening, each, settled):
+    """A task that is slow to open runs in long chunks, to a limit; one that opens at once, for about twenty seconds."""
     size = _Size(ChunkPolicy())
     for _ in range(8):
         size.learn(size.best, opening + each * size.best)

@@ -1,4 +1,4 @@
-"""The audit: a batch bench that is off by one least count, anywhere, is found out."""
+"""The audit detects a batch driver that is off by one least count anywhere."""
 
 import numpy as np
 import pytest
@@ -24,8 +24,8 @@ AT_THE_PLOTTER = {
 
 
 @pytest.fixture(scope="module")
-def worked(tmp_path_factory):
-    """A study of one session, and its tally by the true batch bench; the link's results are worked once."""
+def run_once(tmp_path_factory):
+    """Return a study of one session and its tally by the correct batch driver; the run over the link is cached."""
     loaded = build_study(AT_THE_PLOTTER, tmp_path_factory.mktemp("study"))
     tally = Tally.empty(1, 1)
     run_study(loaded, tally, InProcess())
@@ -35,16 +35,16 @@ def worked(tmp_path_factory):
         yield loaded, tally
 
 
-def test_the_true_batch_bench_passes(worked):
-    assert audit_study(*worked, 1) == []
+def test_the_correct_batch_driver_passes(run_once):
+    assert audit_study(*run_once, 1) == []
 
 
 def _reads(name, off):
-    """Hands that read `off` more of an element, a counter axis or whatever the method gives."""
+    """Return a method that adds `off` to a reading of an element, of a counter axis or to its only value."""
 
-    def perturbed(truly):
+    def perturbed(true_method):
         def method(self, active, *arguments):
-            found = truly(self, active, *arguments)
+            found = true_method(self, active, *arguments)
             if isinstance(found, dict):
                 return {each: value + off * (each == name) for each, value in found.items()}
             return found + off * (name in arguments)
@@ -55,9 +55,9 @@ def _reads(name, off):
 
 
 def _moves(off, *names):
-    def perturbed(truly):
+    def perturbed(true_method):
         def method(self, active, element, values):
-            truly(self, active, element, values + off * (element in names))
+            true_method(self, active, element, values + off * (element in names))
 
         return method
 
@@ -65,7 +65,7 @@ def _moves(off, *names):
 
 
 def _gives(off):
-    return lambda truly: lambda self, active, *arguments: truly(self, active, *arguments) + off
+    return lambda true_method: lambda self, active, *arguments: true_method(self, active, *arguments) + off
 
 
 PERTURBED = {
@@ -80,30 +80,30 @@ PERTURBED = {
 
 
 @pytest.mark.parametrize("name", list(PERTURBED))
-def test_a_least_count_too_much_anywhere_on_the_bench_is_found_out(worked, monkeypatch, name):
+def test_one_least_count_too_much_anywhere_in_the_batch_driver_is_detected(run_once, monkeypatch, name):
     method, perturbed = PERTURBED[name]
     monkeypatch.setattr(BatchDriver, method, perturbed(getattr(BatchDriver, method)))
-    (found,) = audit_study(*worked, 1)
+    (found,) = audit_study(*run_once, 1)
     assert (found.cell, found.replicate) == (1, 1)
 
 
-def test_a_strip_that_is_off_by_a_millimetre_on_the_bench_is_found_out(worked, monkeypatch):
-    truly = simulating.run_all_methods_batch
+def test_a_strip_of_the_batch_that_is_off_by_a_millimetre_is_detected(run_once, monkeypatch):
+    true_method = simulating.run_all_methods_batch
 
     def a_millimetre_off(*arguments, **options):
-        documents = truly(*arguments, **options)
+        documents = true_method(*arguments, **options)
         for document in documents:
             document["strip"]["residuals_m"]["C1"]["X"] += 0.001
         return documents
 
     monkeypatch.setattr(simulating, "run_all_methods_batch", a_millimetre_off)
-    (found,) = audit_study(*worked, 1)
+    (found,) = audit_study(*run_once, 1)
     assert (found.place, found.others) == ("strip.residuals_m.C1.X", 0)
 
 
-def test_a_response_that_the_study_did_not_keep_as_it_was_is_found_out(worked):
-    laid, _ = worked
+def test_a_changed_response_of_the_study_is_detected(run_once):
+    loaded_study, _ = run_once
     other = Tally.empty(1, 1)
     other.add(0, np.array([[1.0]]))
-    (found,) = audit_study(laid, other, 1)
+    (found,) = audit_study(loaded_study, other, 1)
     assert (found.place, found.batch_value, found.others) == ("hours", 1.0, 0)

@@ -1,4 +1,4 @@
-"""`a7sim study` at the door: what it prints and leaves, going on after being killed, and its audit."""
+"""`a7sim study` at the command line: its output and files, resuming after a kill, and its audit."""
 
 import json
 import os
@@ -33,7 +33,7 @@ levels = [1, 4]
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
-    """A study and the folder that it left, worked in this process without interruption."""
+    """Return a study, its output folder and its process, run without interruption."""
     folder = tmp_path_factory.mktemp("study")
     path = folder / "pointings.toml"
     path.write_text(STUDY)
@@ -42,7 +42,7 @@ def study(tmp_path_factory):
     return path, folder / "out", done
 
 
-def test_a_study_says_what_was_asked_and_answers_in_words(study):
+def test_a_study_prints_its_question_and_an_answer_in_words(study):
     words = " ".join(study[2].stdout.split())
     assert "Do more pointings help?" in words
     assert "strip_height_at_checks_m: from" in words
@@ -50,7 +50,7 @@ def test_a_study_says_what_was_asked_and_answers_in_words(study):
     assert "1 session run again over the link: same digits." in words
 
 
-def test_a_replicate_in_the_table_is_the_session_that_run_gives_for_its_seed(study, capsys):
+def test_a_replicate_in_the_table_equals_the_session_of_run_with_its_seed(study, capsys):
     _, out, _ = study
     line = next(each for each in (out / "replicates.csv").read_text().splitlines() if each.startswith("2,1,"))
     _, _, seed, _, height = line.split(",")
@@ -60,7 +60,7 @@ def test_a_replicate_in_the_table_is_the_session_that_run_gives_for_its_seed(stu
     assert float(height) == pytest.approx(checks["height"], rel=1e-9)
 
 
-def test_a_study_that_was_killed_goes_on_to_the_same_bytes_and_leaves_no_worker_behind(study, tmp_path, capsys):
+def test_a_killed_study_resumes_to_the_same_bytes_and_leaves_no_worker_process(study, tmp_path, capsys):
     path, whole, _ = study
     out = tmp_path / "out"
     command = [*COMMAND, "study", str(path), "--workers", "1", "--out", str(out)]
@@ -87,26 +87,28 @@ def _gone(group):
     return False
 
 
-def _wait_until(there):
-    until = time.monotonic() + TIMEOUT_S
-    while not there():
-        assert time.monotonic() < until
+def _wait_until(is_reached):
+    deadline = time.monotonic() + TIMEOUT_S
+    while not is_reached():
+        assert time.monotonic() < deadline
         time.sleep(0.01)
 
 
-def test_the_page_says_what_was_asked_how_and_the_answer(study):
+def test_the_page_contains_question_method_and_answer(study):
     page = (study[1] / PAGE).read_text()
     for words in ("Do more pointings help?", "The answer", "Scenario a8-strip", "comparator.pointings = 4", "<svg"):
         assert words in page
 
 
-def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, capsys, monkeypatch):
+def test_without_matplotlib_all_files_but_the_page_are_written_and_this_is_reported(
+    study, tmp_path, capsys, monkeypatch
+):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    told = a7sim_captured(
+    done = a7sim_captured(
         capsys, "study", study[0], "--replicates", 2, "--executor", "process", "--out", tmp_path / "out"
     )
-    assert told.returncode == 0
-    assert "matplotlib" in told.stderr
+    assert done.returncode == 0
+    assert "matplotlib" in done.stderr
     expected = {*FILES, checkpoint_path(tmp_path).name} - {PAGE} - ({*KINDS} - {checkpoint_path(tmp_path).name})
     assert set(_files_in(tmp_path / "out")) == expected
 
@@ -118,28 +120,28 @@ def test_without_matplotlib_all_but_the_page_is_left_and_said(study, tmp_path, c
         (("--replicates", "5"), "expected at least the 12 replicates already done, got 5"),
     ],
 )
-def test_replicates_that_cannot_be_are_one_sentence_and_exit_code_2(study, capsys, arguments, words):
+def test_an_impossible_number_of_replicates_gives_one_sentence_and_exit_code_2(study, capsys, arguments, words):
     path, out, _ = study
-    told = a7sim_captured(capsys, "study", path, "--out", out, *arguments)
-    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
-    assert words in told.stderr
+    done = a7sim_captured(capsys, "study", path, "--out", out, *arguments)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert words in done.stderr
 
 
-def test_a_folder_of_something_else_is_left_alone(study, tmp_path, capsys):
+def test_a_folder_with_other_files_is_not_changed(study, tmp_path, capsys):
     (tmp_path / "precious").write_text("x")
-    told = a7sim_captured(capsys, "study", study[0], "--out", tmp_path)
-    assert told.returncode == 2
-    assert "expected an empty folder" in told.stderr
+    done = a7sim_captured(capsys, "study", study[0], "--out", tmp_path)
+    assert done.returncode == 2
+    assert "expected an empty folder" in done.stderr
     assert [each.name for each in tmp_path.iterdir()] == ["precious"]
 
 
-def test_a_failed_audit_is_one_sentence_and_exit_code_3(study, capsys, monkeypatch):
+def test_a_failed_audit_gives_one_sentence_and_exit_code_3(study, capsys, monkeypatch):
     path, out, _ = study
     differences = [AuditDifference(2, each, 99, "strip.rms", 0.25, 0.5, 7) for each in (3, 4)]
     monkeypatch.setattr("a7sim.cli.study.audit_study", lambda laid, tally, picks: differences)
-    told = a7sim_captured(capsys, "study", path, "--executor", "process", "--out", out, "--audit", 5, "--quiet")
-    assert (told.returncode, told.stdout) == (3, "")
-    assert told.stderr == (
+    done = a7sim_captured(capsys, "study", path, "--executor", "process", "--out", out, "--audit", 5, "--quiet")
+    assert (done.returncode, done.stdout) == (3, "")
+    assert done.stderr == (
         "a7sim: 2 of 5 sessions differ over the link; cell 2, replicate 3, seed 99: "
         "strip.rms is 0.25 on the batch bench and 0.5 over the link (7 values more differ)\n"
     )

@@ -1,4 +1,4 @@
-"""Whoever works a study, and whoever of them is lost: the same bytes, or one sentence."""
+"""Every executor gives the same bytes; a lost worker or a wrong executor gives one sentence."""
 
 import multiprocessing
 import os
@@ -35,13 +35,13 @@ def laid(tmp_path):
     return build_study(BY_COMPARATOR, tmp_path)
 
 
-def worked(study, tally, kind, workers, tick=lambda _: None):
+def run_with(study, tally, kind, workers, tick=lambda _: None):
     with open_executor(kind, workers) as (executor, at_once):
         run_study(study, tally, executor, at_once, None, tick, ChunkPolicy(largest_chunk=1))
 
 
-def left(study, tally, folder):
-    """Return all that a study says and leaves."""
+def written_files(study, tally, folder):
+    """Return the document and the files of a study."""
     folder.mkdir()
     document = findings_document(study, tally)
     write_results(folder, study, tally, document)
@@ -50,17 +50,17 @@ def left(study, tally, folder):
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory):
-    """What the study leaves when this process works it without interruption."""
+def uninterrupted(tmp_path_factory):
+    """Return the document and the files of the study run in this process without interruption."""
     folder = tmp_path_factory.mktemp("alone")
     study = laid(folder)
     tally = Tally.empty(2, 2)
-    worked(study, tally, "process", None)
-    return left(study, tally, folder / "out")
+    run_with(study, tally, "process", None)
+    return written_files(study, tally, folder / "out")
 
 
-class OneLost:
-    """Kills a worker at the first result."""
+class WorkerKiller:
+    """A progress callback that kills a worker at the first result."""
 
     def __init__(self):
         self.pid = None
@@ -72,24 +72,24 @@ class OneLost:
 
 
 @pytest.mark.slow
-def test_a_study_on_dask_gives_the_same_bytes_though_a_worker_is_killed(alone, tmp_path, capfd):
-    study, tally, killing = laid(tmp_path), Tally.empty(2, 2), OneLost()
-    worked(study, tally, "dask", 2, killing)
+def test_a_study_on_dask_gives_the_same_bytes_after_a_worker_is_killed(uninterrupted, tmp_path, capfd):
+    study, tally, killing = laid(tmp_path), Tally.empty(2, 2), WorkerKiller()
+    run_with(study, tally, "dask", 2, killing)
     assert killing.pid is not None
-    assert left(study, tally, tmp_path / "out") == alone
+    assert written_files(study, tally, tmp_path / "out") == uninterrupted
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_pool_that_lost_a_worker_says_so_and_the_study_goes_on_to_the_same_bytes(alone, tmp_path):
+def test_a_pool_reports_a_lost_worker_and_the_study_resumes_to_the_same_bytes(uninterrupted, tmp_path):
     study, tally = laid(tmp_path), Tally.empty(2, 2)
     with pytest.raises(A7SimError, match="a worker of the study was lost"):
-        worked(study, tally, "pool", 1, OneLost())
+        run_with(study, tally, "pool", 1, WorkerKiller())
     assert 0 < tally.done.sum() < 12
-    worked(study, tally, "process", None)
-    assert left(study, tally, tmp_path / "out") == alone
+    run_with(study, tally, "process", None)
+    assert written_files(study, tally, tmp_path / "out") == uninterrupted
 
 
-def test_an_interrupted_pool_does_not_wait_for_what_its_workers_do():
+def test_an_interrupted_pool_does_not_wait_for_its_workers():
     with pytest.raises(KeyboardInterrupt), open_executor("pool", 1) as (executor, _):
         worker = executor.submit(os.getpid).result()
         executor.submit(time.sleep, 10 * TIMEOUT_S)
@@ -103,13 +103,13 @@ def test_an_interrupted_pool_does_not_wait_for_what_its_workers_do():
 @pytest.mark.slow
 @NEEDS_MPI
 @pytest.mark.parametrize(("n", "started"), [(3, ("-m", "a7sim")), (2, ("-m", "mpi4py.futures", "-m", "a7sim"))])
-def test_a_study_over_mpi_prints_the_same_bytes(alone, tmp_path, n, started):
+def test_a_study_over_mpi_prints_the_same_bytes(uninterrupted, tmp_path, n, started):
     path = tmp_path / "study.toml"
     path.write_text(AS_A_FILE)
     command = [RUN_BY_MPI, "-n", str(n), sys.executable, *started, "study", str(path), "--executor", "mpi", "--json"]
-    told = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    assert (told.returncode, told.stderr) == (0, "")
-    assert told.stdout == alone["--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == uninterrupted["--json"]
 
 
 AS_A_FILE = """
@@ -129,8 +129,8 @@ levels = [1, 4]
 
 
 @pytest.fixture
-def nobody():
-    """The URL of a door behind which nobody answers."""
+def silent_scheduler():
+    """Yield the URL of an endpoint that does not answer."""
     with socket.socket() as bound:
         bound.bind(("127.0.0.1", 0))
         yield f"tcp://127.0.0.1:{bound.getsockname()[1]}"
@@ -145,42 +145,42 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", list(WRONG))
-def test_a_wrong_executor_is_one_sentence_and_exit_code_2(capsys, name):
+def test_a_wrong_executor_gives_one_sentence_and_exit_code_2(capsys, name):
     arguments, words = WRONG[name]
-    told = a7sim_captured(capsys, "study", "levels", *arguments)
-    assert (told.returncode, told.stdout, len(told.stderr.splitlines())) == (2, "", 1)
-    assert words in told.stderr
+    done = a7sim_captured(capsys, "study", "levels", *arguments)
+    assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
+    assert words in done.stderr
 
 
-def test_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, nobody):
+def test_the_error_message_for_a_scheduler_that_does_not_answer_is_one_sentence(monkeypatch, capsys, silent_scheduler):
     monkeypatch.setattr("a7sim.study.dask_executor.WORKER_TIMEOUT_S", 0.5)
-    told = a7sim_captured(capsys, "study", "levels", "--executor", "dask", "--scheduler", nobody)
-    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
-    assert f"--scheduler: expected one that answers at {nobody}" in told.stderr
+    done = a7sim_captured(capsys, "study", "levels", "--executor", "dask", "--scheduler", silent_scheduler)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert f"--scheduler: expected one that answers at {silent_scheduler}" in done.stderr
 
 
 @pytest.mark.parametrize(
     ("kind", "module", "words"),
     [("dask", "distributed", "pip install 'a7sim[dask]'"), ("mpi", "mpi4py", "pip install 'a7sim[mpi]'")],
 )
-def test_what_is_not_installed_is_one_sentence_with_how_to_get_it(monkeypatch, capsys, kind, module, words):
+def test_the_error_message_for_a_missing_library_names_the_extra_to_install(monkeypatch, capsys, kind, module, words):
     monkeypatch.setitem(sys.modules, module, None)
-    told = a7sim_captured(capsys, "study", "levels", "--executor", kind)
-    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
-    assert words in told.stderr
+    done = a7sim_captured(capsys, "study", "levels", "--executor", kind)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert words in done.stderr
 
 
 @NEEDS_MPI
-def test_mpi_alone_is_one_sentence_that_says_how_to_start_it():
+def test_the_error_message_for_a_single_mpi_process_names_the_command():
     code = "from a7sim.cli import main; main()"
     command = [sys.executable, "-c", code, "study", "levels", "--executor", "mpi"]
-    told = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
-    assert (told.returncode, len(told.stderr.splitlines())) == (2, 1)
-    assert "expected two processes or more (mpiexec -n 5 a7sim study" in told.stderr
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
+    assert "expected two processes or more (mpiexec -n 5 a7sim study" in done.stderr
 
 
-def the_world_of(monkeypatch, processes, executor):
-    """Stand in for mpi4py in one process of so many, which is given an executor in the first and none in another."""
+def patch_mpi(monkeypatch, processes, executor):
+    """Replace mpi4py in one of `processes` processes; `executor` is None in every process but the first."""
 
     @contextmanager
     def pool(world, root, env):
@@ -188,30 +188,30 @@ def the_world_of(monkeypatch, processes, executor):
         yield executor
 
     world = SimpleNamespace(Get_size=lambda: processes)
-    there = {
+    modules = {
         "mpi4py.MPI": SimpleNamespace(COMM_WORLD=world),
         "mpi4py.futures": SimpleNamespace(MPICommExecutor=pool),
     }
-    monkeypatch.setattr(mpi_executor, "import_module", there.__getitem__)
+    monkeypatch.setattr(mpi_executor, "import_module", modules.__getitem__)
 
 
-def test_over_mpi_the_first_process_asks_all_the_others(monkeypatch):
+def test_over_mpi_the_first_process_uses_all_other_processes(monkeypatch):
     executor = object()
-    the_world_of(monkeypatch, 5, executor)
+    patch_mpi(monkeypatch, 5, executor)
     with mpi_executor.open_mpi_executor({"THREADS": "1"}) as asked:
         assert asked == (executor, 4)
 
 
-def test_over_mpi_another_process_works_and_ends_without_a_word(monkeypatch):
-    """It must not go on: the first one alone says what comes of the study."""
-    the_world_of(monkeypatch, 5, None)
+def test_over_mpi_another_process_works_and_exits_without_output(monkeypatch):
+    """The process must exit: only the first one prints the results of the study."""
+    patch_mpi(monkeypatch, 5, None)
     with pytest.raises(SystemExit) as ended, ExitStack() as stack:
         stack.enter_context(mpi_executor.open_mpi_executor({"THREADS": "1"}))
     assert ended.value.code == 0
 
 
-def test_a_process_that_was_started_alone_is_told_how_to_start_more(monkeypatch):
-    the_world_of(monkeypatch, 1, object())
+def test_the_error_message_for_one_process_names_the_command_for_more(monkeypatch):
+    patch_mpi(monkeypatch, 1, object())
     with (
         pytest.raises(A7SimError, match=r"two processes or more \(mpiexec -n 5 .*\), got this one alone"),
         ExitStack() as stack,

@@ -1,4 +1,4 @@
-"""What a study says it found, in words and in tables for a terminal, of tallies whose answer is known."""
+"""Findings of a study, in words and in tables for a terminal, from tallies with a known answer."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ NOISE = 0.01 * np.random.default_rng(1).standard_normal((40, 8))
 
 
 def found(folder, values, **changes):
-    """The document of a study whose responses all have replicates ``(cells, n)``, and its tables as text."""
+    """Return the document of a study whose responses have values ``(cells, n)``, and its tables as text."""
     loaded = build_study(BY_COMPARATOR | {"responses": [RESPONSE]} | changes, folder)
     values = np.asarray(values, dtype=float)
     responses = len(loaded.responses)
@@ -45,7 +45,7 @@ def found(folder, values, **changes):
     ],
     ids=["one cell", "nothing varies", "no effect", "an effect", "a cell gave up", "all gave up"],
 )
-def test_the_answer_says_what_the_numbers_are(tmp_path, changes, values, answer):
+def test_the_answer_contains_the_numbers(tmp_path, changes, values, answer):
     document, printed = found(tmp_path, values, **changes)
     assert answer in document["answer"][0]
     assert document["in_a_sentence"] == document["answer"][0]
@@ -89,7 +89,7 @@ def test_factors_varied_one_at_a_time_have_an_analysis_each(tmp_path):
         (0.0, "no factor was seen to matter"),
     ],
 )
-def test_a_hypercube_says_which_way_a_factor_works_or_that_none_does(tmp_path, slope, words):
+def test_a_hypercube_reports_the_direction_of_a_factor_or_that_none_has_an_effect(tmp_path, slope, words):
     hypercube = {
         "design": "latin-hypercube",
         "samples": 40,
@@ -105,7 +105,7 @@ def test_a_hypercube_says_which_way_a_factor_works_or_that_none_does(tmp_path, s
     assert document["variance"] == []
 
 
-def test_curves_are_drawn_of_no_more_levels_than_can_be_told_apart(tmp_path):
+def test_density_curves_are_drawn_up_to_a_maximum_of_levels(tmp_path):
     levels = list(range(1, MAX_DENSITIES + 2))
     for count in (MAX_DENSITIES, MAX_DENSITIES + 1):
         document, _ = found(tmp_path, 2.0 + NOISE[:count], factor=[POINTINGS | {"levels": levels[:count]}])
@@ -114,7 +114,7 @@ def test_curves_are_drawn_of_no_more_levels_than_can_be_told_apart(tmp_path):
 
 
 @pytest.mark.parametrize(("half_width", "reached"), [(1e-6, False), (1.0, True)])
-def test_a_precision_that_is_not_reached_is_said(tmp_path, half_width, reached):
+def test_a_precision_that_is_not_reached_is_reported(tmp_path, half_width, reached):
     precision = {"response": RESPONSE, "half_width": half_width}
     document, printed = found(tmp_path, 2.0 + NOISE[:2], precision=precision)
     assert document["precision_reached"] is reached
@@ -141,11 +141,11 @@ CLAIM = {"says": "One pointing does.", "about": "the second pointing", "factor":
 def test_a_claim_is_printed_with_its_verdict_and_every_answer(tmp_path, claim, values, verdict, answer):
     document, printed = found(tmp_path, values, claim=[CLAIM | claim])
     printed = " ".join(printed.split())
-    (said,) = document["claims"]
-    assert said["verdict"] == verdict
+    (result,) = document["claims"]
+    assert result["verdict"] == verdict
     assert f"the second pointing {verdict} Claim: One pointing does." in printed
     assert document["in_a_sentence"].startswith(f"The second pointing {verdict}")
-    (sentence,) = said["answer"]
+    (sentence,) = result["answer"]
     assert answer in sentence
     assert " ".join(sentence.split()) in printed
 
@@ -164,7 +164,7 @@ def test_each_response_of_a_hypercube_has_its_own_effects_everywhere(tmp_path):
     assert page.count("What each factor weighs alone") == 2
 
 
-def test_a_page_says_loudly_that_all_gave_up_and_that_a_precision_is_not_reached(tmp_path):
+def test_a_page_highlights_that_all_gave_up_and_that_a_precision_is_not_reached(tmp_path):
     precision = {"response": RESPONSE, "half_width": 1e-6}
     page, figures = study_markdown(found(tmp_path, np.full((2, 8), np.nan), precision=precision)[0], "figures")
     assert "**Every session gave up.**" in page
@@ -182,12 +182,12 @@ def test_a_page_says_loudly_that_all_gave_up_and_that_a_precision_is_not_reached
         ),
     ],
 )
-def test_numbers_have_their_places_on_an_axis(tmp_path, factor, places):
+def test_numeric_levels_have_their_positions_on_an_axis(tmp_path, factor, places):
     document, _ = found(tmp_path, 2.0 + NOISE[:2], factor=[factor])
     assert document["places"] == {factor["name"]: places}
 
 
-def test_pairs_of_numbers_lie_as_far_apart_as_they_are(tmp_path):
+def test_pairs_of_numbers_have_distances_in_proportion(tmp_path):
     levels = {"name": "levels", "path": "plan.centre_levels", "levels": [[4900.0, 5100.0], [4800.0, 5200.0]]}
     at_the_plotter = {"scenario": "akwanga", "settings": {}, "responses": ["hours"]}
     document, _ = found(tmp_path, 2.0 + NOISE[:2], factor=[levels], **at_the_plotter)
@@ -195,7 +195,7 @@ def test_pairs_of_numbers_lie_as_far_apart_as_they_are(tmp_path):
     assert places == {"counts": "separation of levels", "at": {"4900 - 5100": 200.0, "4800 - 5200": 400.0}}
 
 
-def test_levels_far_apart_are_drawn_on_a_logarithmic_axis_and_too_many_cells_not_one_by_one(tmp_path, monkeypatch):
+def test_levels_far_apart_have_a_logarithmic_axis_and_too_many_cells_are_not_drawn_singly(tmp_path, monkeypatch):
     factor = {"name": "film", "path": "film.irregular_um", "levels": [0.1, 1.0]}
     document, _ = found(tmp_path, 2.0 + NOISE[:2], factor=[factor])
     document["densities"] = []

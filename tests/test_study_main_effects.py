@@ -1,4 +1,4 @@
-"""What the factors of a Latin hypercube weigh: shares and slopes beside models whose answer is known."""
+"""Main effects of the factors of a Latin hypercube: shares and slopes of models with a known answer."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def by_name(means, values):
     return {each.factor: each for each in main_effects(means, values)}
 
 
-def test_the_shares_of_an_additive_model_are_those_of_its_variances():
+def test_the_shares_of_an_additive_model_equal_those_of_its_variances():
     """y = 3 u - 2 v + w of uniform u, v, w: shares 9/14, 4/14 and 1/14, within their intervals."""
     u, v, w = a_hypercube(1000, 3)
     found = by_name(3.0 * u - 2.0 * v + w, {"u": u, "v": v, "w": w})
@@ -35,7 +35,7 @@ def test_the_shares_of_an_additive_model_are_those_of_its_variances():
 
 
 def test_ishigamis_function_has_its_first_order_indices():
-    """sin x1 + 7 sin^2 x2 + 0.1 x3^4 sin x1: 0.3139, 0.4424 and 0; ranks see no slope in the second, shares do."""
+    """sin x1 + 7 sin^2 x2 + 0.1 x3^4 sin x1: 0.3139, 0.4424 and 0; the second has a share but no slope of ranks."""
     x = np.pi * (2.0 * a_hypercube(2000, 3) - 1.0)
     means = np.sin(x[0]) + 7.0 * np.sin(x[1]) ** 2 + 0.1 * x[2] ** 4 * np.sin(x[0])
     found = by_name(means, {"x1": x[0], "x2": x[1], "x3": x[2]})
@@ -45,8 +45,8 @@ def test_ishigamis_function_has_its_first_order_indices():
     assert abs(found["x2"].slope) < 0.1
 
 
-def test_a_factor_that_does_nothing_is_seldom_seen_to_matter():
-    """With 200 seeds about one in twenty has p < 0.05, and the interval of its share reaches zero nearly always."""
+def test_a_factor_without_effect_is_seldom_significant():
+    """With 200 seeds about one in twenty has p < 0.05, and the interval of its share nearly always contains zero."""
     effects = []
     for seed in range(200):
         u, v = a_hypercube(40, 2, seed)
@@ -63,7 +63,7 @@ def test_levels_without_order_have_a_share_and_no_slope():
     assert np.isnan(found["kind"].slope)
 
 
-def test_cells_without_a_number_are_left_out_and_too_few_are_not_taken_apart():
+def test_cells_without_a_number_are_excluded_and_too_few_cells_have_no_main_effects():
     u, v = a_hypercube(50, 2)
     means = u.copy()
     means[::5] = np.nan
@@ -73,7 +73,7 @@ def test_cells_without_a_number_are_left_out_and_too_few_are_not_taken_apart():
     assert main_effects(np.ones(50), {"u": u}) == []
 
 
-def test_chance_is_what_means_of_few_replicates_leave_and_common_numbers_are_none_of_it():
+def test_chance_is_the_scatter_of_means_of_few_replicates_without_common_random_numbers():
     rng = np.random.default_rng(2)
     cells, common = np.linspace(0.0, 1.0, 400)[:, None], 50.0 * rng.standard_normal(10)
     values = cells + common + 0.5 * rng.standard_normal((400, 10))
@@ -82,8 +82,8 @@ def test_chance_is_what_means_of_few_replicates_leave_and_common_numbers_are_non
     assert np.isnan(noise_share(values[:, :1]))
 
 
-def test_a_hypercube_is_told_in_words_tables_and_a_page(tmp_path):
-    """From the tally of a study on; the first factor makes the numbers, and the answer says so."""
+def test_a_hypercube_is_reported_in_words_tables_and_a_page(tmp_path):
+    """Starting from the tally of a study: only the first factor has an effect, and the answer names it."""
     raw = {
         "schema_version": 1,
         "title": "t",

@@ -1,4 +1,4 @@
-"""Statistics of studies against independent programs and against what they promise."""
+"""Statistics of studies against independent programs and against their stated coverage."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def test_a_comparison_is_the_paired_t_test_of_scipy():
     assert found.interval == pytest.approx(tuple(expected.confidence_interval()))
 
 
-def test_a_comparison_leaves_out_pairs_of_which_one_gave_up():
+def test_a_comparison_excludes_pairs_with_a_session_that_gave_up():
     found = compare_cells(np.array([1.0, np.nan, 3.0, 5.0]), np.array([0.0, 1.0, np.nan, 2.0]))
     assert (found.pairs, found.difference) == (2, 2.0)
 
@@ -40,8 +40,8 @@ def test_one_factor_in_blocks_is_the_paired_t_test_squared():
     assert (effect.freedom, rest.freedom) == (1, 24)
 
 
-def test_variance_of_two_factors_is_that_of_a_least_squares_fit():
-    """The squares of every source are what a fit loses without its columns."""
+def test_variance_of_two_factors_equals_that_of_a_least_squares_fit():
+    """The sum of squares of every source is the increase of the residual sum without its columns."""
     values = RNG.normal(size=(2, 3, 7)) + np.array([0.0, 1.0])[:, None, None] + np.arange(3.0)[None, :, None]
     i, j, k = (axis.ravel() for axis in np.indices(values.shape))
     columns = {
@@ -68,7 +68,7 @@ def _remaining(columns, values):
     return float(((values - design @ np.linalg.lstsq(design, values, rcond=None)[0]) ** 2).sum())
 
 
-def test_the_interval_of_a_quantile_is_what_many_resamples_give():
+def test_the_interval_of_a_quantile_equals_that_of_many_resamples():
     values = RNG.exponential(size=60)
     found, interval = quantile_with_interval(values, 0.5)
     resampled = np.sort(RNG.choice(values, (20_000, 60)), axis=1)[:, 29]
@@ -78,7 +78,7 @@ def test_the_interval_of_a_quantile_is_what_many_resamples_give():
         assert (resampled <= limit).mean() >= share - 0.005
 
 
-def test_intervals_hold_the_truth_as_often_as_they_say():
+def test_intervals_contain_the_truth_at_the_stated_rate():
     held = {"mean": 0, "sd": 0, "median": 0}
     for key in range(100):
         values = RNG.normal(size=50)
@@ -97,12 +97,12 @@ def test_the_bootstrap_is_the_same_for_the_same_seed_and_key():
     assert sd_interval(values, 1, (0, 2)) == sd_interval(values, 1, (0, 2)) != sd_interval(values, 1, (0, 3))
 
 
-def test_holm_by_hand():
+def test_holms_correction_equals_a_hand_computation():
     assert holm([0.01, 0.04, 0.03, float("nan")]) == pytest.approx([0.03, 0.06, 0.06, float("nan")], nan_ok=True)
 
 
-def test_an_effect_does_not_count_cells_twice_that_share_their_sessions():
-    """The F of a factor is the same when every cell is doubled over a factor that changes nothing."""
+def test_an_effect_does_not_count_cells_with_common_sessions_twice():
+    """The F of a factor is the same when every cell is repeated over a factor without effect."""
     values = RNG.normal(size=(3, 30))
     (alone, *_), (crossed, nothing, both, _) = (
         variance_by_factor(values, ["f"]),
@@ -113,8 +113,8 @@ def test_an_effect_does_not_count_cells_twice_that_share_their_sessions():
     assert (nothing.squares, both.squares) == (0.0, 0.0)
 
 
-def test_the_freedom_of_an_effect_is_cut_where_its_levels_go_together():
-    """Greenhouse's and Geisser's epsilon is 1 / freedom where all differences are one number times another."""
+def test_the_degrees_of_freedom_of_an_effect_are_reduced_if_its_levels_are_correlated():
+    """Greenhouse's and Geisser's epsilon is 1 / freedom if all differences are multiples of one series."""
     base = RNG.normal(size=40)
     one_direction = np.outer([0.0, 1.0, 2.0, 3.0], base) + RNG.normal(size=40)
     effect = variance_by_factor(one_direction, ["f"])[0]
@@ -123,7 +123,7 @@ def test_the_freedom_of_an_effect_is_cut_where_its_levels_go_together():
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.6])
-def test_the_interval_of_an_effect_holds_the_truth_as_often_as_it_says(shift):
+def test_the_interval_of_an_effect_contains_the_truth_at_the_stated_rate(shift):
     rng = np.random.default_rng(int(10 * shift))
     held = 0
     for _ in range(300):
@@ -150,7 +150,7 @@ def test_dependence_in_one_cell_is_the_regression_of_scipy():
     assert found.correlation_interval == pytest.approx(tuple(interval), abs=0.03)
 
 
-def test_dependence_takes_off_what_differs_between_cells_and_counts_replicates_once():
+def test_dependence_removes_differences_between_cells_and_counts_replicates_once():
     x = RNG.normal(size=(1, 300))
     y = 0.2 * x + RNG.normal(size=(1, 300))
     one, same_twice = regress_on(y, x), regress_on(np.vstack([y, y + 7.0]), np.vstack([x, x - 5.0]))
@@ -159,15 +159,15 @@ def test_dependence_takes_off_what_differs_between_cells_and_counts_replicates_o
     assert same_twice.correlation_interval == pytest.approx(one.correlation_interval)
 
 
-def test_a_density_holds_nearly_all_and_is_nothing_where_nothing_varies():
+def test_a_density_contains_nearly_all_values_and_constant_values_have_none():
     found = densities({"f": RNG.normal(5.0, 1.0, 3000), "same": np.full(3000, 2.0)})
     assert list(found["densities"]) == ["f"]
     assert np.trapezoid(found["densities"]["f"], found["places"]) == pytest.approx(1.0, abs=0.02)
     assert densities({"same": np.full(10, 2.0)}) == {}
 
 
-def test_too_few_values_say_nothing_instead_of_something():
-    """One value has no spread, two no regression, nothing no quantile: nan, never an error or a narrow interval."""
+def test_too_few_values_give_nan():
+    """One value has no spread, two no regression, none no quantile: the result is NaN."""
     one, two = np.array([2.0]), np.array([[1.0, 2.0]])
     assert np.isnan(mean_interval(2.0, 0.0, 1)).all()
     assert np.isnan(sd_interval(one, 1, (0,))).all()

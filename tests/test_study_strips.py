@@ -1,4 +1,4 @@
-"""A study whose replicate is the thesis: every case of both models worked once, twenty-five strips, claims tested."""
+"""A study that replicates the thesis: every case of both models measured once, twenty-five strips, claims tested."""
 
 import msgspec
 import numpy as np
@@ -67,8 +67,8 @@ SEEDS = [replicate_seed(STUDY["seed"], each) for each in range(3)]
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory):
-    """The numbers of three replicates as the study's task gives them, and the sessions that it worked, by case."""
+def task_results(tmp_path_factory):
+    """Return the numbers of three replicates from the study's task, and its sessions by case."""
     (task,) = laid(tmp_path_factory.mktemp("asked")).tasks
     by_case = {}
 
@@ -82,9 +82,9 @@ def asked(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def replicates(asked):
+def replicates(task_results):
     """Sessions of three replicates in every case; in the second case D gave up."""
-    _, by_case = asked
+    _, by_case = task_results
     gave_up = {"status": "does not fit", "message": "said in the test", "models": ()}
     return [
         {
@@ -100,8 +100,8 @@ def ground(scenario):
     return ground_control(scenario, build_scene(scenario, 1))
 
 
-def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, ground):
-    """Every one of the twenty-five is `grounded` to a hundredth of a micron, far below the 0.1 mm that are printed."""
+def test_strips_on_arrays_equal_those_of_single_orientations(scenario, replicates, ground):
+    """All twenty-five agree with `orient_strip` to a hundredth of a micron, far below the 0.1 mm printed."""
     by_case = {case: each.strip_models for case, each in replicates[0].items()}
     (documents,) = combine_strips(replicates[:1], 2, ground, scenario.strip)
     assert len(documents) == 25
@@ -115,12 +115,12 @@ def test_strips_on_arrays_are_those_of_the_computing_room(scenario, replicates, 
             }
 
 
-def test_no_bit_of_a_strip_depends_on_the_replicates_beside_it(scenario, replicates, ground):
+def test_no_bit_of_a_strip_depends_on_the_other_replicates(scenario, replicates, ground):
     together = list(combine_strips(replicates, 2, ground, scenario.strip))
     assert together == [strips for each in replicates for strips in combine_strips([each], 2, ground, scenario.strip)]
 
 
-def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replicates, ground):
+def test_a_session_that_gave_up_removes_only_its_own_strips(scenario, replicates, ground):
     _, of_second, *_ = combine_strips(replicates, 2, ground, scenario.strip)
     statuses = [document["status"] for document in of_second]
     assert statuses.count("does not fit") == 9
@@ -128,15 +128,15 @@ def test_a_session_that_gave_up_takes_only_its_own_strips_along(scenario, replic
     assert of_second[3]["message"] == "said in the test"
 
 
-def test_hours_of_a_strip_of_one_case_are_those_of_its_session(scenario, replicates, ground):
+def test_hours_of_a_strip_of_one_case_equal_those_of_its_session(scenario, replicates, ground):
     for number, case in ((0, "A"), (12, "C"), (24, "E")):
         hours = next(combine_strips(replicates[:1], 2, ground, scenario.strip))[number]["operator"]["hours"]
         assert hours == pytest.approx(replicates[0][case].operator["hours"], abs=1e-3)
 
 
 @pytest.fixture(scope="module")
-def worked(tmp_path_factory):
-    """A study and numbers as its sessions might have given them."""
+def study_and_tally(tmp_path_factory):
+    """Return a study and a tally of numbers that its sessions could give."""
     study = laid(tmp_path_factory.mktemp("study"), replicates=30)
     tally = Tally.empty(25, 4)
     rng = np.random.default_rng(2)
@@ -147,9 +147,7 @@ def worked(tmp_path_factory):
     return study, tally
 
 
-def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combined(
-    tmp_path, monkeypatch, replicates, ground
-):
+def test_each_cell_is_a_strip_and_a_model_does_not_depend_on_its_partner(tmp_path, monkeypatch, replicates, ground):
     """One task gives the numbers of all cells, in the order of the thesis."""
     study = laid(tmp_path)
     (task,) = study.tasks
@@ -166,16 +164,16 @@ def test_cells_are_the_strips_and_a_model_does_not_know_with_which_it_is_combine
     assert (task.cells, study.task_of(8)) == (25, (task, 8))
 
 
-def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypatch, scenario, replicates, ground):
-    """An audit works these alone, on both benches, and its strips are the study's to the last bit."""
+def test_one_cell_needs_only_the_sessions_of_its_cases(tmp_path, monkeypatch, scenario, replicates, ground):
+    """An audit runs only these, with both drivers, and its strips equal those of the study to the last bit."""
     (task,) = laid(tmp_path).tasks
     worked_cases = []
 
-    def worked_already(scenario, *_, **__):
+    def measured_before(scenario, *_, **__):
         worked_cases.append(scenario.plan.case)
         return [replicates[0][scenario.plan.case], replicates[2][scenario.plan.case]]
 
-    monkeypatch.setattr("a7sim.study.simulating.measure_all_methods_batch", worked_already)
+    monkeypatch.setattr("a7sim.study.simulating.measure_all_methods_batch", measured_before)
     whole = list(combine_strips([replicates[0], replicates[2]], 2, ground, scenario.strip))
     for cell, cases in ((8, ["B", "D"]), (15, ["D", "A"]), (12, ["C"])):
         assert task.batch_documents(cell, SEEDS[::2]) == [each[cell] for each in whole]
@@ -183,7 +181,7 @@ def test_one_cell_needs_no_session_but_those_of_its_own_cases(tmp_path, monkeypa
         worked_cases.clear()
 
 
-def test_a_task_cut_off_between_its_cells_goes_on_to_the_same_numbers(tmp_path, monkeypatch):
+def test_a_task_interrupted_between_its_cells_resumes_to_the_same_numbers(tmp_path, monkeypatch):
     """Some of the cells that share a session may have been added and others not; chunks do not matter."""
 
     def numbers(_, seeds):
@@ -209,38 +207,38 @@ def _numbers(study, largest_chunk, tally=None):
 
 
 @pytest.mark.slow
-def test_a_strip_over_the_link_gives_the_same_digits(tmp_path, asked):
-    """A picked strip is that of the sessions of its two cases over the link, to the last digit kept."""
+def test_a_strip_over_the_link_gives_the_same_digits(tmp_path, task_results):
+    """A selected strip equals that of the sessions of its two cases over the link, to the last digit stored."""
     task, cell = laid(tmp_path).task_of(8)
-    numbers, _ = asked
+    numbers, _ = task_results
     assert task.run_single(cell, SEEDS[1]).tolist() == numbers[cell, :, 1].tolist()
 
 
 @pytest.fixture(scope="module")
-def document(worked):
-    return findings_document(*worked)
+def document(study_and_tally):
+    return findings_document(*study_and_tally)
 
 
-def test_claims_are_answered_in_words_and_in_one_sentence(document):
+def test_claims_have_answers_in_words_and_in_one_sentence(document):
     for claim, about in zip(document["claims"], ("density", "the centres"), strict=True):
         assert claim["short"].startswith(f"{about} {claim['verdict']} (")
         assert claim["short"].lower() in document["in_a_sentence"].lower()
     assert "E minus A" in document["claims"][0]["answer"][0]
 
 
-def test_a_factor_that_a_response_cannot_know_has_no_variance(document):
+def test_a_factor_that_does_not_affect_a_response_has_no_variance(document):
     analysis = next(each for each in document["variance"] if each["response"] == "rotation_error_gon@1")
     assert [each["squares"] > 0.0 for each in analysis["sources"][:3]] == [True, False, False]
 
 
-def test_the_page_has_the_map_of_the_combinations_and_asks_nothing_of_the_network(document):
+def test_the_page_has_the_map_of_the_combinations_and_loads_nothing_from_the_network(document):
     page = study_page(document)
     for words in ("Claim: Density matters.", "Strip plan at checks (m) by model 1 and model 2", "densities by model 1"):
         assert words in page
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_the_markdown_names_every_figure_that_comes_with_it_and_figures_stand_alone(document):
+def test_the_markdown_names_every_figure_file_and_figures_are_self_contained(document):
     text, figures = study_markdown(document, "../figures/the-")
     assert {"map-strip-plan-at-checks-m.svg", "claims-effect.svg", "claims-correlation.svg"} <= set(figures)
     for name, svg in figures.items():
@@ -256,7 +254,7 @@ def test_the_markdown_names_every_figure_that_comes_with_it_and_figures_stand_al
     [(0.5, 400, claims.MATTERS), (0.0, 4000, claims.NOTHING), (0.0, 20, claims.OPEN)],
 )
 def test_the_verdict_of_a_claim_follows_from_effect_and_interval(shift, replicates, verdict):
-    """What is not seen with twenty replicates is left open; only a narrow interval says that nothing is there."""
+    """An effect not detected with twenty replicates is left open; only a narrow interval shows that there is none."""
     rng = np.random.default_rng(1)
     values = rng.normal(10.0, 1.0, (3, replicates)) + np.array([0.0, 0.0, shift])[:, None]
     cells = [Cell(number, {"f": level}, {}) for number, level in enumerate("ABC", start=1)]
@@ -287,12 +285,12 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("name", list(MISTAKES))
-def test_a_mistake_gets_one_sentence(tmp_path, name):
+def test_the_error_message_for_a_mistake_is_one_sentence(tmp_path, name):
     changes, words = MISTAKES[name]
-    with pytest.raises(A7SimError) as told:
+    with pytest.raises(A7SimError) as raised:
         laid(tmp_path, **({"claim": []} | changes))
-    assert words in str(told.value)
-    assert len(str(told.value).splitlines()) == 1
+    assert words in str(raised.value)
+    assert len(str(raised.value).splitlines()) == 1
 
 
 def test_the_thesis_has_twenty_five_cells_and_its_own_claims():

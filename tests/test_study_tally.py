@@ -1,4 +1,4 @@
-"""What a study keeps: moments, quantiles of any number of replicates, and checkpoints of either kind."""
+"""Tally of a study: moments, quantiles of any number of replicates, and checkpoints of both kinds."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tests.support.hypothesis_profile import examples
 RNG = np.random.default_rng(3)
 
 
-def test_moments_are_those_of_numpy_and_leave_out_who_gave_up():
+def test_moments_equal_those_of_numpy_and_exclude_sessions_that_gave_up():
     values = RNG.normal(1e6, 1e-3, (2, 500))
     values[1, ::7] = np.nan
     tally = Tally.empty(1, 2)
@@ -29,7 +29,7 @@ def test_moments_are_those_of_numpy_and_leave_out_who_gave_up():
     assert tally.high[0].tolist() == np.nanmax(values, axis=1).tolist()
 
 
-def test_who_gave_up_first_and_a_number_that_never_changes_leave_no_trace_in_the_moments():
+def test_a_first_session_that_gave_up_and_a_constant_response_do_not_affect_the_moments():
     tally = Tally.empty(1, 2)
     tally.add(0, np.array([[np.nan], [0.1]]))
     tally.add(0, np.array([[3.0, 5.0], [0.1, 0.1]]))
@@ -63,7 +63,7 @@ ORDERS = {
     order=st.sampled_from(sorted(ORDERS)),
     cuts=st.lists(st.floats(0, 1), max_size=5),
 )
-def test_a_sketch_is_wrong_by_no_more_than_it_says_and_the_same_however_it_was_cut(seed, n, order, cuts):
+def test_a_sketch_is_within_its_error_bound_and_does_not_depend_on_chunks(seed, n, order, cuts):
     """Bound: every rank is within `rank_error`, which is below 0.25 % at a million values and smaller for fewer."""
     values = ORDERS[order](np.random.default_rng(seed).normal(size=n))
     sketch, cut = QuantileSketch(), QuantileSketch()
@@ -81,14 +81,14 @@ def test_a_sketch_is_wrong_by_no_more_than_it_says_and_the_same_however_it_was_c
     assert np.abs(ranks - np.searchsorted(everything, everything, side="right")).max() <= sketch.rank_error
 
 
-def test_the_bound_of_a_sketch_of_a_million_values_is_a_quarter_of_a_percent_and_it_keeps_few():
+def test_the_rank_error_of_a_million_values_is_below_a_quarter_of_a_percent_with_few_values_stored():
     sketch = QuantileSketch()
     sketch.add(RNG.normal(size=1_000_000))
     assert sketch.rank_error < 2500
     assert sketch.values.size < 10 * CAPACITY
 
 
-def test_a_quantile_of_values_that_stand_for_several_is_that_of_them_written_out():
+def test_a_quantile_of_weighted_values_equals_that_of_repeated_values():
     values, counts = RNG.normal(size=50), RNG.integers(1, 9, 50)
     for share in (0.05, 0.5, 0.95):
         assert quantile_with_interval(values, share, counts) == quantile_with_interval(np.repeat(values, counts), share)
@@ -106,7 +106,7 @@ def tally():
 
 @pytest.mark.parametrize("name", KINDS)
 @pytest.mark.parametrize("other", KINDS)
-def test_a_checkpoint_of_either_kind_holds_all_and_can_go_on_as_the_other(tmp_path, tally, name, other):
+def test_a_checkpoint_of_each_kind_is_complete_and_can_be_continued_as_the_other(tmp_path, tally, name, other):
     save(tally, tmp_path / name, "study")
     again = load(tmp_path / name, "study")
     save(again, tmp_path / other, "study")
@@ -126,14 +126,14 @@ def test_a_checkpoint_of_either_kind_holds_all_and_can_go_on_as_the_other(tmp_pa
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_tally_of_nothing_can_be_left_and_gone_on_with(tmp_path, name):
+def test_an_empty_tally_can_be_saved_and_loaded(tmp_path, name):
     save(Tally.empty(2, 3), tmp_path / name, "study")
     again = load(tmp_path / name, "study")
     assert (again.done.tolist(), again.mean.shape, again.sample(1).shape) == ([0, 0], (2, 3), (3, 0))
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_a_checkpoint_of_something_else_is_refused_in_one_sentence(tmp_path, tally, name, monkeypatch):
+def test_the_error_message_for_a_wrong_checkpoint_is_one_sentence(tmp_path, tally, name, monkeypatch):
     path = tmp_path / name
     save(tally, path, "study")
     with pytest.raises(A7SimError, match=r"got that of another \(--force"):
@@ -143,12 +143,12 @@ def test_a_checkpoint_of_something_else_is_refused_in_one_sentence(tmp_path, tal
         load(path, "study")
     for damaged in (b"nothing", b"", path.read_bytes()[:-300]):
         path.write_bytes(damaged)
-        with pytest.raises(A7SimError, match="got a file that is none") as told:
+        with pytest.raises(A7SimError, match="got a file that is none") as raised:
             load(path, "study")
-        assert len(str(told.value).splitlines()) == 1
+        assert len(str(raised.value).splitlines()) == 1
 
 
-def test_without_pyarrow_checkpoints_are_npz_and_parquet_is_one_sentence(tmp_path, tally, monkeypatch):
+def test_without_pyarrow_checkpoints_are_npz_and_parquet_gives_an_error(tmp_path, tally, monkeypatch):
     assert checkpoint_path(tmp_path).name == "checkpoint.parquet"
     save(tally, tmp_path / "checkpoint.parquet", "study")
     monkeypatch.setattr(checkpoint, "find_spec", lambda name: None)

@@ -1,4 +1,4 @@
-"""Theory beside simulation: Hallert's closed forms, what counters make of them, sessions that spread as they say."""
+"""Theory beside simulation: Hallert's closed forms, the effect of counters, and the scatter of sessions."""
 
 import math
 
@@ -44,7 +44,7 @@ def quiet(**others):
     return load_scenario("akwanga", settings=QUIET | {path.replace("__", "."): each for path, each in others.items()})
 
 
-def test_without_counters_theory_is_hallerts(monkeypatch):
+def test_without_counters_theory_equals_hallerts(monkeypatch):
     """Six points, dependent: variances of by 2/3 + h^2/d^2 + 3 h^4/(4 d^4), kappa 2/(3 b^2),
     phi h^2/(b^2 d^2), omega 3 h^2/(4 d^4), bz h^2/(2 d^2)."""
     monkeypatch.setattr(theory, "ROUNDING", 0.0)
@@ -67,7 +67,7 @@ def test_without_counters_theory_is_hallerts(monkeypatch):
 
 
 @pytest.mark.parametrize(("fraction", "sd"), [(0.5, 0.001), (0.2, 0.0004), (0.43, 0.002), (0.9, 0.02), (0.0, 0.005)])
-def test_a_count_takes_an_error_as_often_as_drawn_errors_say(fraction, sd):
+def test_a_count_absorbs_an_error_at_the_rate_of_drawn_errors(fraction, sd):
     errors = sd * np.random.default_rng(7).standard_normal(400_000)
     shown = LEAST_COUNT * np.round((LEAST_COUNT * fraction + errors) / LEAST_COUNT)
     gain, added = quantised_error(fraction, sd)
@@ -75,11 +75,11 @@ def test_a_count_takes_an_error_as_often_as_drawn_errors_say(fraction, sd):
     assert (gain * sd) ** 2 + added == pytest.approx(shown.var(), abs=0.01 * LEAST_COUNT**2)
 
 
-def test_far_beyond_a_count_its_fraction_does_not_matter():
+def test_the_fraction_of_a_count_has_no_effect_for_large_errors():
     assert quantised_error(0.3, 3.0 * LEAST_COUNT) == pytest.approx((1.0, ROUNDING**2), rel=1e-3)
 
 
-def test_centres_from_two_levels_spread_as_drawn_pointings_do():
+def test_centres_from_two_levels_scatter_as_drawn_pointings_do():
     """The thesis's T0 = 13.5 or so, 4900 and 5100, six points: within 3 % of 20,000 centres from pointings."""
     scenario = quiet()
     plan, c = scenario.plan, scenario.camera.c
@@ -99,8 +99,8 @@ def test_centres_from_two_levels_spread_as_drawn_pointings_do():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["independent", "dependent"])
-def test_sessions_spread_as_theory_says_and_not_as_least_squares_alone(method):
-    """Within what 150 sessions can tell (a quarter); least squares of free parallaxes falls short by more."""
+def test_sessions_scatter_as_theory_predicts_and_not_as_least_squares_alone(method):
+    """Equal within the uncertainty of 150 sessions (a quarter); least squares of free parallaxes differs by more."""
     scenario = quiet(plan__method=method, plan__centre_method="scales")
     documents = open_batch(scenario, range(150)).run()
     predicted = element_errors(scenario, 0)
@@ -111,7 +111,7 @@ def test_sessions_spread_as_theory_says_and_not_as_least_squares_alone(method):
     assert all(0.75 < ratio < 1.25 for ratio in ratios.values()), ratios
 
 
-def test_theory_is_silent_where_it_has_nothing_to_say():
+def test_responses_without_a_theory_have_no_prediction():
     element = "models.0.truth.element_differences.kappa2"
     assert predicted_sd(quiet(), element) > 0.0
     assert predicted_sd(quiet(), "models.7.truth.element_differences.kappa2") is None
@@ -123,21 +123,21 @@ def test_theory_is_silent_where_it_has_nothing_to_say():
     assert theory_comparison(quiet(), "hours", 1.0, 1.0) == {}
 
 
-def test_an_rms_is_compared_by_its_quadratic_mean_and_a_difference_by_its_spread():
+def test_an_rms_is_compared_by_its_quadratic_mean_and_a_difference_by_its_standard_deviation():
     X, _, _ = centre_sds(quiet())
     assert theory_comparison(quiet(), "centre_X_error", 0.6 * X, 0.8 * X)["ratio"] == pytest.approx(1.0)
     name = "models.0.truth.centre_differences.left.X0"
     assert theory_comparison(quiet(), name, 0.6 * X, 0.8 * X)["ratio"] == pytest.approx(0.8)
 
 
-def test_what_theory_leaves_out_is_said():
+def test_omissions_of_the_theory_are_reported():
     assert theory_limits(quiet()) == []
     worn = quiet(instrument__condition="worn", film__shear_sigma_ppm=10.0, observer__blunder_rate=0.01)
     assert [each.split()[0] for each in theory_limits(worn)] == ["film", "faults", "slips,"]
 
 
 def studied(folder):
-    """The document of three replicates of two cells."""
+    """Return the document of three replicates of two cells."""
     raw = {
         "schema_version": 1,
         "title": "t",
@@ -164,7 +164,7 @@ def test_a_study_has_theory_in_its_document_and_on_its_page(tmp_path):
     assert page.table("Means, standard deviations and quantiles").rows[0][-1] == f"{spread['ratio']:.4g}"
 
 
-def test_a_study_prints_what_theory_says_and_how_far_it_is_from_that(tmp_path):
+def test_a_study_prints_the_prediction_of_theory_and_the_ratio_to_it(tmp_path):
     document = studied(tmp_path)
     console = Console(width=250)
     with console.capture() as printed:

@@ -14,14 +14,14 @@ def com_port(option, value=b""):
 
 
 @given(st.binary(max_size=200), st.integers(1, 7))
-def test_binary_data_comes_through_escaping_in_any_pieces(data, size):
+def test_binary_data_survives_escaping_in_any_pieces(data, size):
     line = WILL_BINARY + Telnet.escape(data)
     telnet = Telnet()
     assert b"".join(telnet.received(line[i : i + size])[0] for i in range(0, len(line), size)) == data
 
 
 @given(st.binary(max_size=300))
-def test_no_bytes_upset_it_and_answers_stay_small(noise):
+def test_any_bytes_are_accepted_and_answers_stay_short(noise):
     telnet = Telnet()
     _, answer = telnet.received(noise)
     assert len(answer) <= 12 * len(noise)
@@ -29,7 +29,7 @@ def test_no_bytes_upset_it_and_answers_stay_small(noise):
     assert telnet.received(b"\x41*TST?\n")[0].endswith(b"*TST?\n")
 
 
-def test_without_binary_a_nul_behind_a_cr_is_padding():
+def test_without_binary_a_nul_after_a_cr_is_padding():
     telnet = Telnet()
     assert telnet.received(b"A\r\0B\0\r")[0] == b"A\rB\0\r"
     assert telnet.received(b"\0C")[0] == b"C"
@@ -49,11 +49,11 @@ def test_without_binary_a_nul_behind_a_cr_is_padding():
         (b"\xff\xfb\x2c", b"\xff\xfd\x2c" + com_port(107, b"\xb0")),
     ],
 )
-def test_options_are_answered_where_they_change_something(asked, answer):
+def test_an_option_is_answered_if_it_changes_a_state(asked, answer):
     assert Telnet().received(asked) == (b"", answer)
 
 
-def test_an_option_that_is_asked_twice_is_answered_once():
+def test_an_option_requested_twice_is_answered_once():
     telnet = Telnet()
     first = telnet.received(b"\xff\xfe\x00\xff\xfd\x00")[1]
     assert first == b"\xff\xfc\x00\xff\xfb\x00"
@@ -81,18 +81,18 @@ def test_an_option_that_is_asked_twice_is_answered_once():
         (6, b"", b"\x00"),
     ],
 )
-def test_com_port_settings_are_taken_and_told(option, value, answer):
+def test_com_port_settings_are_accepted_and_confirmed(option, value, answer):
     telnet = Telnet()
     assert telnet.received(com_port(option, value)) == (b"", com_port(option + 100, answer))
 
 
-def test_a_control_that_was_set_is_told_when_it_is_asked():
+def test_a_control_that_was_set_is_returned_on_request():
     telnet = Telnet()
     telnet.received(com_port(5, b"\x09"))
     assert telnet.received(com_port(5, b"\x07"))[1] == com_port(105, b"\x09")
 
 
-def test_a_subnegotiation_without_end_keeps_little_and_ends_with_its_end():
+def test_the_buffer_of_an_endless_subnegotiation_is_bounded_until_its_end():
     telnet = Telnet()
     assert telnet.received(b"\xff\xfa\x2c\x01" + b"x" * 1_000_000) == (b"", b"")
     assert len(telnet._sub) == MAX_SUBNEGOTIATION_LENGTH
@@ -104,11 +104,11 @@ def test_a_subnegotiation_without_end_keeps_little_and_ends_with_its_end():
     [com_port(8, b""), com_port(99, b"\x01"), com_port(5, b""), b"\xff\xfa\x2c\xff\xf0", b"\xff\xfa\x18\x01\xff\xf0"],
     ids=["flow control is suspended", "an unknown option", "a control of nothing", "no option", "another negotiation"],
 )
-def test_what_asks_nothing_that_it_knows_gets_no_answer_and_the_data_after_it_come_through(sent):
+def test_an_unknown_request_gets_no_answer_and_the_data_after_it_are_read(sent):
     assert Telnet().received(sent + b"*TST?\n") == (b"*TST?\n", b"")
 
 
-def test_a_command_in_the_midst_of_a_subnegotiation_is_passed_over():
+def test_a_command_within_a_subnegotiation_is_ignored():
     within = com_port(1, (115200).to_bytes(4, "big"))
     with_nop = within[:6] + b"\xff\xf1" + within[6:]
     assert Telnet().received(with_nop) == Telnet().received(within)

@@ -1,4 +1,4 @@
-"""Training (issue 8): exercises hold what they promise, grades say why, and a journal that was edited is found."""
+"""Training (issue 8): exercises decide as designed, grades have reasons, and an edited journal is detected."""
 
 from dataclasses import replace
 
@@ -25,8 +25,8 @@ EXERCISES = all_exercises()
         ({"excellent": -1e12, "passing": -1e12}, "its tolerances are impossible"),
     ],
 )
-def test_a_criterion_that_decides_nothing_is_found_out(parallax, limits, mutation):
-    """The time of exercise 4 with a limit that everybody reaches, or nobody."""
+def test_a_criterion_without_effect_is_detected(parallax, limits, mutation):
+    """Set a limit for the time of exercise 4 that every run reaches, or none."""
     time = parallax.exercise.criteria[-1]
     criteria = [*parallax.exercise.criteria[:-1], changed(time, **limits)]
     found = check_exercise(changed(parallax, exercise=changed(parallax.exercise, criteria=criteria)))
@@ -35,7 +35,7 @@ def test_a_criterion_that_decides_nothing_is_found_out(parallax, limits, mutatio
     assert {each.split(":")[0] for each in dead} == {"time"}
 
 
-def test_exercises_are_numbered_once_and_found_by_that():
+def test_exercises_have_unique_numbers_and_are_found_by_them():
     numbers = [each.exercise.number for each in EXERCISES]
     assert len(numbers) == len(set(numbers)) and numbers == sorted(numbers)
     assert all(each.name.startswith(f"{each.exercise.number:02d}-") for each in EXERCISES)
@@ -48,27 +48,27 @@ def parallax():
 
 
 @pytest.fixture(scope="module")
-def left_standing(parallax, tmp_path_factory):
+def faulty_attempt(parallax, tmp_path_factory):
     folder = tmp_path_factory.mktemp("attempt")
     assert run_attempt(parallax, PlayedRun(script="faulty-by2-left.a7s"), folder, 4) == ""
     return folder
 
 
-def test_the_sheet_names_the_mistake_with_its_points(parallax, left_standing):
-    grade = grade_folder(parallax, 4, left_standing)
+def test_the_sheet_names_the_mistake_with_its_points(parallax, faulty_attempt):
+    grade = grade_folder(parallax, 4, faulty_attempt)
     mark = next(each for each in grade.failed if each.id == "at-rest")
     assert not grade.passed
     assert mark.sentence.startswith("by\" was never returned to 0 before reading by' at points 1, 5, 6, 2 and 4: -25.")
 
 
-def test_an_edited_reply_is_found_by_working_the_journal_again(parallax, left_standing, tmp_path):
-    there = read_journal(left_standing / "session.jsonl")
+def test_an_edited_reply_is_detected_by_replaying_the_journal(parallax, faulty_attempt, tmp_path):
+    journal = read_journal(faulty_attempt / "session.jsonl")
     number = next(
-        n for n in range(2, len(there) + 1) if there.event(n).dir == "<" and there.event(n).client == "student"
+        n for n in range(2, len(journal) + 1) if journal.event(n).dir == "<" and journal.event(n).client == "student"
     )
-    events = [there.header, *(there.event(n) for n in range(2, len(there) + 1))]
+    events = [journal.header, *(journal.event(n) for n in range(2, len(journal) + 1))]
     events[0].pop("crc")
-    forged = type(there.event(number))(**{**_fields(there.event(number)), "text": "23"})
+    forged = type(journal.event(number))(**{**_fields(journal.event(number)), "text": "23"})
     events[number - 1] = forged
     chain = ChecksumChain()
     (tmp_path / "session.jsonl").write_bytes(b"".join(chain.line(each) + b"\n" for each in events))
@@ -76,22 +76,22 @@ def test_an_edited_reply_is_found_by_working_the_journal_again(parallax, left_st
         grade_folder(parallax, 4, tmp_path)
 
 
-def test_a_journal_of_another_seed_is_another_students(parallax, left_standing):
+def test_a_journal_of_another_seed_is_rejected(parallax, faulty_attempt):
     with pytest.raises(UnreliableJournalError, match="expected an attempt with"):
-        grade_folder(parallax, 5, left_standing)
+        grade_folder(parallax, 5, faulty_attempt)
 
 
 def _fields(event):
     return {name: getattr(event, name) for name in event.__struct_fields__}
 
 
-def test_the_journal_of_an_attempt_holds_no_truth(left_standing):
-    header = read_journal(left_standing / "session.jsonl").header
+def test_the_journal_of_an_attempt_contains_no_truth(faulty_attempt):
+    header = read_journal(faulty_attempt / "session.jsonl").header
     assert "scenario" not in header
-    assert [each.name for each in left_standing.iterdir()] == ["session.jsonl"]
+    assert [each.name for each in faulty_attempt.iterdir()] == ["session.jsonl"]
 
 
-def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
+def test_an_interrupted_attempt_resumes_where_it_ended(parallax, tmp_path):
     with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
         engine = environment.instrument.open("client2", time=1.0)
         engine.feed(b'PROJ1:BY 0.30\nREC "1011",BY1\n', 2.0)
@@ -109,7 +109,7 @@ def test_an_attempt_that_was_cut_off_goes_on_where_it_was(parallax, tmp_path):
     )
 
 
-def test_neighbours_have_different_photographs_and_the_same_student_the_same(parallax):
+def test_two_students_have_different_photographs_and_one_student_always_the_same(parallax):
     ada, bob = (attempt_seed(name, parallax.name) for name in ("ada", "bob"))
     assert ada != bob and ada == attempt_seed("ada", parallax.name)
     assert ada != attempt_seed("ada", parallax.name, "exam")
@@ -117,7 +117,7 @@ def test_neighbours_have_different_photographs_and_the_same_student_the_same(par
     assert first == again and first.photos != other.photos
 
 
-def test_answers_written_down_count_before_those_noted(tmp_path):
+def test_answers_of_the_answer_file_have_precedence_over_notes(tmp_path):
     counters = find_exercise("1")
     assert run_attempt(counters, counters.exercise.reference, tmp_path, 1) == ""
     assert grade_folder(counters, 1, tmp_path).passed
@@ -156,7 +156,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("was", BAD)
-def test_a_mistake_in_an_exercise_is_named_with_its_place(parallax, tmp_path, was):
+def test_the_error_message_for_a_mistake_in_an_exercise_names_its_place(parallax, tmp_path, was):
     now, expected = BAD[was]
     text = (parallax.folder / "exercise.toml").read_text()
     assert was in text
@@ -165,8 +165,8 @@ def test_a_mistake_in_an_exercise_is_named_with_its_place(parallax, tmp_path, wa
         read_exercise(tmp_path)
 
 
-def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
-    """By lines that a person might say; what the instrument refuses and what is struck out did not happen."""
+def test_metrics_have_reasons_in_words_with_numbers(parallax, tmp_path):
+    """Evaluate typed lines; rejected commands and struck readings are ignored."""
     with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
         engine = environment.instrument.open("client2", time=5.0)
         lines = (
@@ -191,8 +191,8 @@ def test_measures_say_what_they_found_in_words_with_numbers(parallax, tmp_path):
         assert record.answers == {"play": "0.08", "slip": "none"}
 
 
-def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parallax, tmp_path):
-    """At the console whatever is in hand is registered, so that an element is named says nothing."""
+def test_a_registration_is_a_pointing_unless_its_element_was_turned_at_the_point(parallax, tmp_path):
+    """The console registers the element in use, so a named element does not exclude a pointing."""
     with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
         engine = environment.instrument.open("client2", time=5.0)
 
@@ -212,8 +212,8 @@ def test_a_registration_is_a_pointing_unless_its_element_was_turned_there(parall
         assert missing_after(b'REC "1011"') == 1.0
 
 
-def test_an_answer_that_is_missing_or_no_number_is_told_and_measures_nothing(parallax, tmp_path):
-    """What is answered is measured against what was kept back; blanks and capitals of words do not matter."""
+def test_a_missing_or_non_numeric_answer_is_reported_and_has_no_value(parallax, tmp_path):
+    """Compare answers with the hidden values; blanks and capitals of words are ignored."""
     with start_attempt(parallax, 4, tmp_path, "ada", "practice") as environment:
         environment.instrument.open("client2", time=5.0).feed(b'DRIV:X 20;:REC "1011"\n', 6.0)
         blank = environment.record({})

@@ -1,4 +1,4 @@
-"""`a7sim train check` of exercises that are wrong: one sentence a fault, with its place and what was expected."""
+"""`a7sim train check` of wrong exercises: one sentence for each fault, with its place and the expected value."""
 
 import shutil
 
@@ -16,17 +16,17 @@ def parallax():
     return find_exercise("4")
 
 
-def wrong(shelved, **changes):
-    return changed(shelved, exercise=changed(shelved.exercise, **changes))
+def wrong(exercise_folder, **changes):
+    return changed(exercise_folder, exercise=changed(exercise_folder.exercise, **changes))
 
 
-def faults_of(shelved):
-    found = check_exercise(shelved)
+def faults_of(exercise_folder):
+    found = check_exercise(exercise_folder)
     assert all("\n" not in fault and "expected " in fault for fault in found.faults)
     return found.faults
 
 
-def test_all_that_is_missing_of_the_form_is_said_at_once_and_nothing_is_played(parallax, tmp_path):
+def test_all_faults_of_form_are_reported_together_before_any_run(parallax, tmp_path):
     first, *others = parallax.exercise.criteria
     bare = wrong(
         ExerciseFolder(parallax.exercise, tmp_path),
@@ -48,8 +48,8 @@ def test_all_that_is_missing_of_the_form_is_said_at_once_and_nothing_is_played(p
     )
 
 
-def test_an_exercise_that_everybody_passes_is_found_out(parallax):
-    """No criterion is required and no points are: the reference for a faulty one, and who does nothing, both pass."""
+def test_an_exercise_that_every_run_passes_is_detected(parallax):
+    """No criterion and no points are required: the reference as a faulty run and a run without actions both pass."""
     exercise = parallax.exercise
     by2_left = next(each for each in exercise.faulty if each.script == "faulty-by2-left.a7s")
     lenient = wrong(
@@ -79,8 +79,8 @@ def test_an_exercise_that_everybody_passes_is_found_out(parallax):
         assert any(fault.startswith(sentence) for fault in faults), (sentence, faults)
 
 
-def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_found_out(parallax, tmp_path):
-    """Found before anything is played: the reference cannot come to its end, which is the last that is said."""
+def test_limits_below_the_accuracy_of_the_eye_and_reversed_bands_are_detected(parallax, tmp_path):
+    """Both are detected before any run; the last fault is that the reference cannot finish."""
     folder = tmp_path / "04-parallax"
     shutil.copytree(parallax.folder, folder)
     lines = (folder / "reference.a7s").read_text(encoding="utf-8").splitlines()
@@ -98,12 +98,12 @@ def test_limits_below_what_the_eye_can_do_and_bands_the_wrong_way_round_are_foun
     assert faults[3].startswith("reference: expected it to finish: ")
 
 
-def test_a_reference_that_fails_is_told_with_what_it_fails(parallax):
+def test_a_reference_that_fails_is_reported_with_the_failed_criterion(parallax):
     (fault, *_) = faults_of(wrong(parallax, reference=PlayedRun(script="faulty-half.a7s"), faulty=[]))[1:]
     assert fault.startswith("reference: expected it to pass, got complete: ")
 
 
-def test_text_of_the_template_that_the_author_left_is_named(parallax):
+def test_remaining_text_of_the_template_is_reported(parallax):
     first, *others = parallax.exercise.criteria
     unfinished = wrong(
         parallax,
@@ -116,14 +116,14 @@ def test_text_of_the_template_that_the_author_left_is_named(parallax):
     assert list(checking._template_text(parallax)) == []
 
 
-def test_a_new_template_is_refused_for_its_own_text(tmp_path):
+def test_a_new_template_is_rejected_for_its_own_text(tmp_path):
     folder = template.write_template(tmp_path / "20-clouds", 20)
     faults = list(checking._template_text(read_exercise(folder)))
     places = {fault.partition(": expected")[0] for fault in faults}
     assert places == {"goal", "complete: feedback", "pointed: feedback", "hint 1", "text.md", "reference.a7s"}
 
 
-def test_files_that_nothing_uses_are_named_and_included_ones_are_not(parallax, tmp_path):
+def test_unused_files_are_reported_and_included_ones_are_not(parallax, tmp_path):
     folder = tmp_path / "04-parallax"
     shutil.copytree(parallax.folder, folder)
     assert list(checking._unused_files(read_exercise(folder))) == []
@@ -136,7 +136,7 @@ def test_files_that_nothing_uses_are_named_and_included_ones_are_not(parallax, t
     ]
 
 
-def test_text_of_the_template_in_text_and_scripts_is_named(parallax, tmp_path):
+def test_text_of_the_template_in_text_and_scripts_is_reported(parallax, tmp_path):
     folder = tmp_path / "04-parallax"
     shutil.copytree(parallax.folder, folder)
     (folder / "text.md").write_text(f"# Parallax\n\n{template.TEXT}\n")
@@ -149,7 +149,7 @@ def test_text_of_the_template_in_text_and_scripts_is_named(parallax, tmp_path):
     ]
 
 
-def test_unused_files_in_folders_of_the_exercise_are_named(parallax, tmp_path):
+def test_unused_files_in_folders_of_the_exercise_are_reported(parallax, tmp_path):
     folder = tmp_path / "04-parallax"
     shutil.copytree(parallax.folder, folder)
     (folder / "parts").mkdir()
@@ -164,7 +164,7 @@ def test_unused_files_in_folders_of_the_exercise_are_named(parallax, tmp_path):
     ]
 
 
-def test_the_check_refuses_template_text_and_unused_files(parallax, tmp_path):
+def test_the_check_rejects_template_text_and_unused_files(parallax, tmp_path):
     """Both are reported with the other faults of form, before any run: the reference is missing."""
     folder = tmp_path / "04-parallax"
     shutil.copytree(parallax.folder, folder)

@@ -1,4 +1,4 @@
-"""`a7sim train` at the door: starting, hints, grades and their exit codes, reports, progress that nothing loses."""
+"""`a7sim train` at the command line: start, hints, grades and exit codes, reports, safe storage of progress."""
 
 import csv
 import io
@@ -29,25 +29,25 @@ REFERENCE = EXERCISES / "04-parallax" / "reference.a7s"
 
 @pytest.fixture
 def train(typed, tmp_path, monkeypatch):
-    """Type `a7sim train ...` as ada, in a home of her own."""
+    """Return a function that runs `a7sim train ...` as student ada with an empty home folder."""
     monkeypatch.setenv("A7SIM_HOME", str(tmp_path / "home"))
     monkeypatch.setenv("A7SIM_STUDENT", "ada")
     return lambda *words: typed("train", *words)
 
 
-def at_the_references_seed(train):
+def run_reference(train):
     return train("start", 4, "--seed", 4, "--script", REFERENCE)
 
 
-def test_a_script_that_passes_ends_in_zero_and_ticks_the_checklist(train):
-    code, out, err = at_the_references_seed(train)
+def test_a_passing_script_has_exit_code_0_and_ticks_the_checklist(train):
+    code, out, err = run_reference(train)
     assert (code, err) == (0, "")
     assert out.count("[x]") == 5 and "[ ]" not in out
     code, out, _ = train("grade", 4)
     assert code == 0 and "passed, 100 of 100 points" in out
 
 
-def test_who_has_done_nothing_is_told_what_is_missing_and_ends_in_one(train, tmp_path):
+def test_an_attempt_without_actions_is_graded_with_the_missing_readings_and_exit_code_1(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text('scenario akwanga\nNOTE "where do I begin?"\n')
     assert train("start", 4, "--script", tmp_path / "nothing.a7s")[0] == 0
     code, out, _ = train("grade", "--json")
@@ -56,9 +56,9 @@ def test_who_has_done_nothing_is_told_what_is_missing_and_ends_in_one(train, tmp
     assert next(m["reason"] for m in document["marks"] if m["id"] == "complete").startswith("24 of 24 registrations")
 
 
-def test_hints_come_in_their_order_cost_points_and_end(train, tmp_path):
+def test_hints_are_given_in_order_cost_points_and_are_limited(train, tmp_path):
     assert train("hint", 4)[0] == 2
-    at_the_references_seed(train)
+    run_reference(train)
     hints = find_exercise("4").exercise.hints
     for number, hint in enumerate(hints, start=1):
         assert train("hint", 4)[1].startswith(f"hint {number} (-{hint.cost:g} points): {hint.text[:20]}")
@@ -69,15 +69,15 @@ def test_hints_come_in_their_order_cost_points_and_end(train, tmp_path):
     assert "passed, 90 of 100 points" in train("grade", "--journal", journal.parent, "--seed", 4)[1]
 
 
-def test_a_damaged_journal_ends_in_three(train, tmp_path):
-    at_the_references_seed(train)
+def test_a_damaged_journal_gives_exit_code_3(train, tmp_path):
+    run_reference(train)
     (journal,) = (tmp_path / "home").rglob("session.jsonl")
     journal.write_bytes(journal.read_bytes().replace(b"PROJ1:BY 0.14", b"PROJ1:BY 0.15", 1))
     code, _, err = train("grade", 4)
     assert code == 3 and "the journal is damaged" in err
 
 
-def test_an_exam_gives_no_hints_ticks_nothing_and_is_over_with_its_grade(train, tmp_path):
+def test_an_exam_gives_no_hints_and_no_ticks_and_is_closed_by_its_grade(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
     out = train("start", 4, "--exam", "--script", tmp_path / "nothing.a7s")[1]
     assert "[ ]" not in out and "exam" in out
@@ -92,18 +92,18 @@ def test_an_exam_gives_no_hints_ticks_nothing_and_is_over_with_its_grade(train, 
         )
 
 
-def test_reset_keeps_the_old_attempt_and_begins_anew(train, tmp_path):
-    at_the_references_seed(train)
+def test_reset_keeps_the_old_attempt_and_starts_a_new_one(train, tmp_path):
+    run_reference(train)
     assert "attempt 1 is closed and kept" in train("reset", 4)[1]
     assert "no attempt is open" in train("reset", 4)[1]
-    at_the_references_seed(train)
+    run_reference(train)
     with Progress(tmp_path / "home") as progress:
         first, second = progress.attempts("ada")
     assert first.closed and not second.closed
     assert (first.folder / "session.jsonl").exists() and first.folder != second.folder
 
 
-def test_answers_are_those_that_the_exercise_asks_for(train):
+def test_only_answers_of_the_exercise_are_accepted(train):
     train("start", 1, "--seed", 1, "--script", EXERCISES / "01-counters" / "reference.a7s")
     assert "expected play=" in train("answer", "slip=3")[2]
     assert train("answer", "play=0.31")[1] == "play=0.31\n"
@@ -112,7 +112,7 @@ def test_answers_are_those_that_the_exercise_asks_for(train):
     assert train("watch", 1, "--every", "0.1")[0] == 0
 
 
-def test_hints_and_answers_are_documents_where_they_are_asked_for(train):
+def test_hints_and_answers_are_printed_as_documents_with_json(train):
     train("start", 1, "--seed", 1, "--script", EXERCISES / "01-counters" / "reference.a7s")
     hint = json.loads(train("hint", 1, "--json")[1])
     first = find_exercise("1").exercise.hints[0]
@@ -121,7 +121,7 @@ def test_hints_and_answers_are_documents_where_they_are_asked_for(train):
     assert (answer["exercise"], answer["answers"]) == ("01-counters", {"play": "0.07"})
 
 
-def test_a_closed_attempt_takes_neither_hints_nor_answers(train, tmp_path):
+def test_a_closed_attempt_accepts_neither_hints_nor_answers(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
     train("start", "--exam", "--script", tmp_path / "nothing.a7s")
     assert "expected --exam, because an exam is open" in train("start", "exam")[2]
@@ -131,7 +131,7 @@ def test_a_closed_attempt_takes_neither_hints_nor_answers(train, tmp_path):
         assert code == 2 and "expected an attempt that is open, got one that is closed" in err
 
 
-def test_a_report_on_nobody_and_a_script_that_does_not_come_out_are_told(train, tmp_path):
+def test_a_report_without_attempts_and_a_failed_script_give_error_messages(train, tmp_path):
     assert train("report", "--format", "csv")[2] == "a7sim: student ada: expected attempts to report on, found none\n"
     (tmp_path / "wrong.a7s").write_text("scenario akwanga\nexpect COUN:X? = 9.5\n")
     code, out, err = train("start", 4, "--script", tmp_path / "wrong.a7s")
@@ -139,14 +139,14 @@ def test_a_report_on_nobody_and_a_script_that_does_not_come_out_are_told(train, 
     assert "address of this machine alone" in train("start", 5, "--link", "tcp://8.8.8.8:1")[2]
 
 
-def test_whoever_says_no_name_is_the_one_who_logged_in(train, monkeypatch):
+def test_the_default_student_is_the_login_name(train, monkeypatch):
     monkeypatch.delenv("A7SIM_STUDENT")
     monkeypatch.setattr("getpass.getuser", lambda: "grace")
     assert train("report", "--format", "csv")[2].startswith("a7sim: student grace: ")
 
 
-def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
-    at_the_references_seed(train)
+def test_a_submitted_attempt_is_graded_from_its_folder(train, tmp_path):
+    run_reference(train)
     (journal,) = (tmp_path / "home").rglob("session.jsonl")
     code, _, err = train("grade", "--journal", journal.parent)
     assert code == 3 and "expected an attempt with scenario_hash" in err
@@ -160,7 +160,7 @@ def test_an_attempt_handed_in_is_graded_from_its_folder_alone(train, tmp_path):
     assert [each["student"] for each in handed_in] == ["ada", "ada", ""]
 
 
-def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch):
+def test_several_processes_grade_a_class_as_one_process_does(tmp_path, monkeypatch):
     monkeypatch.setattr("a7sim.training.submissions.MAX_SERIAL", 2)
     exercise_folder = find_exercise("14")
     folders = []
@@ -176,13 +176,13 @@ def test_a_class_is_graded_by_several_processes_as_by_one(tmp_path, monkeypatch)
     assert not any(each.grade.passed for each in together)
 
 
-def test_an_exercise_is_shown_with_what_is_graded(train):
+def test_list_shows_an_exercise_with_its_criteria(train):
     out = train("list", "4")[1]
     assert "The drum reads to 0.01 mm" in out and "25  the other by is at zero" in out
 
 
 def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch):
-    at_the_references_seed(train)
+    run_reference(train)
     train("grade")
     monkeypatch.setenv("A7SIM_STUDENT", "Bob O'Neill")
     train("start", 4, "--seed", 4, "--script", EXERCISES / "04-parallax" / "faulty-by2-left.a7s")
@@ -206,8 +206,8 @@ def test_reports_of_student_and_class_in_every_form(train, tmp_path, monkeypatch
     assert "by&quot; was never returned to 0" in text and "Bob O&#x27;Neill" in text
 
 
-def test_the_list_says_what_is_passed(train):
-    at_the_references_seed(train)
+def test_the_list_shows_passed_exercises(train):
+    run_reference(train)
     train("grade")
     document = json.loads(train("list", "--json")[1])
     four = next(each for each in document["exercises"] if each["number"] == 4)
@@ -215,7 +215,7 @@ def test_the_list_says_what_is_passed(train):
     assert re.search(r"4 +See and measure y-parallax +passed +100 +1", train("list")[1])
 
 
-def test_a_skeleton_is_read_and_check_says_what_is_missing(train, tmp_path):
+def test_a_new_exercise_can_be_read_and_check_reports_its_missing_parts(train, tmp_path):
     assert train("new", tmp_path / "30-clouds")[0] == 0
     code, out, err = train("check-exercise", tmp_path / "30-clouds")
     assert code == 1 and err == ""
@@ -223,7 +223,7 @@ def test_a_skeleton_is_read_and_check_says_what_is_missing(train, tmp_path):
     assert train("new", tmp_path / "30-clouds")[0] == 2
 
 
-def test_check_finds_an_exercise_that_does_not_hold(train, tmp_path):
+def test_check_detects_an_exercise_with_wrong_limits(train, tmp_path):
     folder = tmp_path / "04-parallax"
     folder.mkdir()
     for path in (EXERCISES / "04-parallax").iterdir():
@@ -238,8 +238,8 @@ def test_check_finds_an_exercise_that_does_not_hold(train, tmp_path):
     assert "faulty-not-cleared.a7s: expected cleared to fail, got opposed" in out
 
 
-def test_served_anybodys_client_works_the_exercise(tmp_path):
-    """Two consoles and a kill -9: what was done is there, and start goes on with it."""
+def test_any_client_can_run_a_served_exercise(tmp_path):
+    """With two consoles and a kill -9 the readings are stored, and start resumes the attempt."""
     environment = {**os.environ, "A7SIM_HOME": str(tmp_path), "A7SIM_STUDENT": "ada"}
     command = [sys.executable, "-m", "a7sim", "train", "start", "4", "--link", "tcp://127.0.0.1:0"]
     for number in (1, 2):
@@ -264,7 +264,7 @@ def test_served_anybodys_client_works_the_exercise(tmp_path):
         assert [each.number for each in progress.attempts("ada")] == [1]
 
 
-def test_two_consoles_write_progress_at_once_and_lose_nothing(tmp_path):
+def test_two_consoles_store_progress_at_the_same_time_without_loss(tmp_path):
     exercise_folder = find_exercise("4")
 
     def begin(student):
@@ -282,7 +282,7 @@ def test_two_consoles_write_progress_at_once_and_lose_nothing(tmp_path):
         assert len(progress.attempts()) == 30
 
 
-def test_progress_of_a_newer_version_is_left_alone_and_an_empty_file_is_brought_up(tmp_path):
+def test_progress_of_a_newer_version_is_not_changed_and_an_empty_file_is_migrated(tmp_path):
     sqlite3.connect(tmp_path / FILE).close()
     Progress(tmp_path).close()
     database = sqlite3.connect(tmp_path / FILE)
@@ -293,7 +293,7 @@ def test_progress_of_a_newer_version_is_left_alone_and_an_empty_file_is_brought_
         Progress(tmp_path)
 
 
-def test_train_help_loads_nothing_heavy():
+def test_train_help_imports_no_heavy_library():
     program = (
         "import atexit, sys; atexit.register(lambda: print(sorted(sys.modules)))\n"
         "sys.argv = ['a7sim', 'train', '--help']; from a7sim.cli import main; main()"

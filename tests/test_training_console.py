@@ -1,4 +1,4 @@
-"""The checklist of an exercise on the console's screen: it ticks itself by what is done there (issue 8)."""
+"""The checklist of an exercise on the screen of the console is ticked by actions there (issue 8)."""
 
 import asyncio
 from pathlib import Path
@@ -15,12 +15,12 @@ from a7sim.training.progress import Progress
 from tests.support.interactive import Person
 
 
-def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: Path) -> None:
+def test_the_checklist_on_the_screen_is_ticked_by_keys(tmp_path: Path) -> None:
     exercise_folder = find_exercise("4")
     with Progress(tmp_path) as progress:
         attempt = progress.begin("ada", exercise_folder)
 
-    async def sit_down(console: Console) -> None:
+    async def operate(console: Console) -> None:
         async with console.run_test(size=(110, 34)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -38,7 +38,7 @@ def test_the_checklist_on_the_screen_ticks_itself_as_keys_are_pressed(tmp_path: 
         port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, timeout=5.0)
         tasks = Checklist(environment, attempt).lines
         asyncio.run(
-            sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES, tasks=tasks)))
+            operate(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES, tasks=tasks)))
         )
         readings = environment.record().readings
         assert [(each.point, each.elements) for each in readings] == [("1011", ("by1",))] * 2 + [("A", ("by1",))]
@@ -48,11 +48,11 @@ def shown(console: Console) -> str:
     return str(console.main.query_one("#tasks").content)
 
 
-def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_a_line(tmp_path: Path) -> None:
-    """As exercise 9 asks for it: its opening engages the gear, its text says COUN:X:PRES."""
+def test_the_console_drives_to_points_with_a_gear_engaged_and_counters_preset(tmp_path: Path) -> None:
+    """Exercise 9: its opening engages the gear, and its text gives COUN:X:PRES."""
     exercise_folder = find_exercise("9")
 
-    async def sit_down(console: Console) -> None:
+    async def operate(console: Console) -> None:
         async with console.run_test(size=(110, 34)) as pilot:
             person = Person(pilot)
             await person.settle()
@@ -67,5 +67,5 @@ def test_points_are_driven_to_with_a_gear_engaged_before_and_counters_preset_by_
 
     with start_attempt(exercise_folder, 9, tmp_path, "ada", "practice") as environment:
         port = InProcessSerial(instrument=environment.instrument, clock=environment.clock, timeout=5.0)
-        asyncio.run(sit_down(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES))))
+        asyncio.run(operate(Console(ConsoleConfig(lambda: Client(port), lambda: 0.0, drawing=DrawingMode.HALVES))))
         assert abs(environment.autograph.counter("X") - 5000.0 - 194.99) < 15.0

@@ -1,4 +1,4 @@
-"""Rehearsals, by which `a7sim train check` judges faulty attempts: nothing is kept, and nothing is otherwise."""
+"""Dry runs, with which `a7sim train check` grades faulty runs: the same results without a journal."""
 
 import pytest
 
@@ -8,33 +8,33 @@ from a7sim.training.dry_runs import DryRuns
 from a7sim.training.grading import evaluate_metrics, load_record
 
 
-def seen(account):
+def state_of(account):
     witness = account.action_log
     return witness.actions, witness.readings, witness.sides, account.seconds, account.answers, account.autograph.state()
 
 
 @pytest.mark.parametrize("number", ["4", "9", "12"])
-def test_a_rehearsal_comes_to_what_the_journal_of_the_same_attempt_gives(number, tmp_path):
-    """By a script and by a procedure, after an opening and without: every deed, reading and measure, to the digit.
+def test_a_dry_run_gives_the_results_of_the_journal_of_the_same_attempt(number, tmp_path):
+    """Compare every action, reading and metric to the digit, for scripts and procedures, with and without opening.
 
-    The second rehearsal begins from an opening that was done for the first.
+    The second dry run starts from the opening of the first.
     """
     exercise_folder = find_exercise(number)
     played = exercise_folder.exercise.faulty[0]
-    rehearsals = DryRuns(exercise_folder)
-    rehearsals.run_attempt(exercise_folder.exercise.reference)
-    rehearsed, error = rehearsals.run_attempt(played)
+    dry_runs = DryRuns(exercise_folder)
+    dry_runs.run_attempt(exercise_folder.exercise.reference)
+    dry_record, error = dry_runs.run_attempt(played)
     seed = seed_for(exercise_folder, played)
     assert run_attempt(exercise_folder, played, tmp_path, seed) == error
     journalled = load_record(exercise_folder, seed, tmp_path)
     assert len(journalled.actions) > 0
-    assert seen(rehearsed) == seen(journalled)
-    assert evaluate_metrics(rehearsed) == evaluate_metrics(journalled)
+    assert state_of(dry_record) == state_of(journalled)
+    assert evaluate_metrics(dry_record) == evaluate_metrics(journalled)
 
 
-def test_what_is_rehearsed_leaves_the_opening_as_it_was():
-    rehearsals = DryRuns(find_exercise("9"))
-    seed = seed_for(rehearsals.exercise_folder, rehearsals.exercise_folder.exercise.reference)
-    before = rehearsals.run_and_leave(seed, None)
-    rehearsals.run_attempt(rehearsals.exercise_folder.exercise.reference)
-    assert seen(rehearsals.run_and_leave(seed, None)) == seen(before)
+def test_a_dry_run_does_not_change_the_stored_opening():
+    dry_runs = DryRuns(find_exercise("9"))
+    seed = seed_for(dry_runs.exercise_folder, dry_runs.exercise_folder.exercise.reference)
+    before = dry_runs.run_and_leave(seed, None)
+    dry_runs.run_attempt(dry_runs.exercise_folder.exercise.reference)
+    assert state_of(dry_runs.run_and_leave(seed, None)) == state_of(before)

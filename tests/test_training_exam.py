@@ -1,4 +1,4 @@
-"""The examination (issue 8): a job of everybody's own, no hints, nothing ticks, a time budget, one grading."""
+"""The examination (issue 8): an own job for each student, no hints, no ticks, a time budget, one grading."""
 
 import re
 from pathlib import Path
@@ -23,13 +23,13 @@ def exam():
 
 @pytest.fixture
 def train(typed, tmp_path, monkeypatch):
-    """Type `a7sim train ...` as ada, in a home of her own."""
+    """Return a function that runs `a7sim train ...` as student ada with an empty home folder."""
     monkeypatch.setenv("A7SIM_HOME", str(tmp_path / "home"))
     monkeypatch.setenv("A7SIM_STUDENT", "ada")
     return lambda *words: typed("train", *words)
 
 
-def test_every_seed_draws_a_job_of_its_own_and_always_the_same(exam):
+def test_each_seed_draws_its_own_job_and_always_the_same(exam):
     scenarios = [scenario_for(exam, seed) for seed in SOME_SEEDS]
     assert scenarios == [scenario_for(exam, seed) for seed in SOME_SEEDS]
     models = [each.models[0] for each in scenarios]
@@ -42,7 +42,7 @@ def test_every_seed_draws_a_job_of_its_own_and_always_the_same(exam):
     assert len({(each.terrain.relief, each.camera.c, each.photos[1].omega) for each in scenarios}) == len(scenarios)
 
 
-def test_what_is_chosen_does_not_change_what_is_varied(exam, tmp_path):
+def test_the_choice_of_a_group_does_not_change_the_varied_numbers(exam, tmp_path):
     """Groups are drawn after the numbers, so an exercise that gets a group keeps its students' photographs."""
     text = (exam.folder / "exercise.toml").read_text()
     without = re.sub(r"^choose = \[$.*?^\]$", "", text, flags=re.DOTALL | re.MULTILINE)
@@ -61,7 +61,7 @@ def test_a_group_without_alternatives_is_a_mistake(exam, tmp_path):
         read_exercise(tmp_path)
 
 
-def test_the_examination_is_started_without_a_name_and_hands_out_the_job(train, tmp_path):
+def test_the_examination_starts_without_an_exercise_name_and_writes_the_job_sheet(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text('scenario akwanga\nNOTE "where do I begin?"\n')
     code, out, _ = train("start", "--exam", "--script", tmp_path / "nothing.a7s")
     assert code == 0 and out.startswith("16 The examination") and ", exam: 0 of 300 minutes" in out
@@ -78,19 +78,19 @@ def test_the_examination_is_started_without_a_name_and_hands_out_the_job(train, 
     assert train("verify")[1].count("not passed") == 1
 
 
-def test_who_names_no_exercise_is_asked_for_one(train):
+def test_the_error_message_for_a_missing_exercise_names_the_argument(train):
     code, _, err = train("start")
     assert code == 2 and "train start: expected EXERCISE, such as 4" in err and "--exam for the examination" in err
 
 
-def test_beyond_its_time_the_checklist_says_so(train, tmp_path):
+def test_the_checklist_states_that_the_time_is_up(train, tmp_path):
     (tmp_path / "slow.a7s").write_text("scenario akwanga\nwait 18060\n*CLS\n")
     assert "301 of 300 minutes, the time is up" in train("start", "--exam", "--script", tmp_path / "slow.a7s")[1]
     assert "fail         0/10   within the time given" in train("verify")[1]
 
 
-def test_fittings_are_judged_by_the_job_sheet(exam, tmp_path):
-    """Right levers do not help where base or pictures are not those that were ordered."""
+def test_fittings_are_graded_by_the_job_sheet(exam, tmp_path):
+    """Correct levers do not count if base or pictures differ from the job sheet."""
     ordered = scenario_for(exam, 16).models[0]
     assert ordered.base == "outside"
     with open_environment(exam, 16, tmp_path, "ada", "exam") as environment:
@@ -101,7 +101,7 @@ def test_fittings_are_judged_by_the_job_sheet(exam, tmp_path):
         assert f"projector 1 has {ordered.left} instead of {ordered.right}" in found(environment.record()).reason
 
 
-def test_what_a_student_wrote_is_none_of_the_papers(train, tmp_path):
+def test_files_of_the_student_are_not_listed_as_papers(train, tmp_path):
     (tmp_path / "nothing.a7s").write_text("scenario akwanga\n*CLS\n")
     train("start", 16, "--script", tmp_path / "nothing.a7s")
     train("hint")
@@ -110,7 +110,7 @@ def test_what_a_student_wrote_is_none_of_the_papers(train, tmp_path):
     assert again.count("your papers:") == 1 and "answers.txt" not in again and "hints.txt" not in again
 
 
-def test_an_exam_keeps_its_first_grade_whatever_is_written_afterwards(train, tmp_path):
+def test_an_exam_keeps_its_first_grade_after_later_changes(train, tmp_path):
     script = EXERCISES / "01-counters" / "faulty-misread.a7s"
     train("start", 1, "--exam", "--seed", 1, "--script", script)
     code, out, _ = train("grade", 1)

@@ -1,4 +1,4 @@
-"""Exercises 10 to 13 and 15: what their texts tell a student to compute holds, and their papers can be solved."""
+"""Exercises 10 to 13 and 15: the formulas of their texts are correct, and their papers can be solved."""
 
 from collections import defaultdict
 
@@ -34,8 +34,8 @@ def grid_tested(tmp_path_factory):
 
 
 @pytest.mark.parametrize("projector", [1, 2])
-def test_the_grid_test_by_hand_finds_what_stands_in_a_worn_projector(grid_tested, projector):
-    """The three formulas of the text, on the registered counters of nine crosses at two levels."""
+def test_the_grid_test_by_hand_finds_the_errors_of_a_worn_projector(grid_tested, projector):
+    """Apply the three formulas of the text to the registered counters of nine crosses at two levels."""
     read = defaultdict(list)
     for each in grid_tested.readings:
         if each.eyes[projector - 1] is not None:
@@ -59,7 +59,7 @@ def test_the_grid_test_by_hand_finds_what_stands_in_a_worn_projector(grid_tested
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
-def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(seed, tmp_path):
+def test_the_misread_point_can_be_found_and_the_strip_gives_the_true_ground(seed, tmp_path):
     exercise_folder = find_exercise("12")
     scenario = scenario_for(exercise_folder, seed)
     made = make_handout("model sheets", scenario, seed, exercise_folder.exercise.handout_options)
@@ -71,7 +71,7 @@ def test_the_misread_point_can_be_found_and_the_strip_comes_to_the_true_ground(s
         assert found == pytest.approx(record.scene.ground_points[name], abs=1.0)
 
 
-def test_who_leaves_the_misread_point_in_is_told_where_it_shows(tmp_path):
+def test_a_misread_point_left_in_the_strip_is_reported_with_its_coordinate(tmp_path):
     exercise_folder = find_exercise("12")
     played = PlayedRun(procedure="strip by cards", options={"wanted": ["8003", "8005"], "leave_out": False})
     assert run_attempt(exercise_folder, played, tmp_path, 12) == ""
@@ -87,8 +87,8 @@ def levelled(tmp_path_factory):
     return load_record(exercise_folder, 8, folder)
 
 
-def test_levelling_turns_both_projectors_as_the_text_says(levelled):
-    """Both phi alike, both omega alike, and the right centre sinks by bx times the tilt of phi (T 3.5)."""
+def test_levelling_turns_both_projectors_as_the_text_describes(levelled):
+    """Both phi change equally, both omega too, and the right centre sinks by bx times the change of phi (T 3.5)."""
     opened = max(each.index for each in levelled.action_log.actions if each.client == "opening") + 1
     level = last_readings(levelled, ["K1"])["K1"][-1]
     turned = {
@@ -102,6 +102,6 @@ def test_levelling_turns_both_projectors_as_the_text_says(levelled):
     assert sunk == pytest.approx(level.counters["bx"] * turned["phi1"] * GON, abs=0.03)
 
 
-def test_a_perfect_eye_is_left_with_what_film_and_counts_allow(levelled):
+def test_a_perfect_eye_has_only_the_residuals_of_film_and_counts(levelled):
     marks = {each.id: each for each in grade_record(levelled).marks}
     assert marks["heights"].value < 0.15 and marks["on-the-ground"].value < 4.0

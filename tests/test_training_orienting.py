@@ -1,4 +1,4 @@
-"""Exercises in orienting a model (issue 8): the rules and sums that their texts give, and what their measures say."""
+"""Exercises in orienting a model (issue 8): the rules and sums of their texts, and the reasons of their metrics."""
 
 import numpy as np
 import pytest
@@ -28,8 +28,8 @@ def akwanga():
     return load_scenario("akwanga")
 
 
-def test_form_a_is_hallerts_six_point_form(akwanga):
-    """The multipliers of case A add up to the closed form, an oracle of its own."""
+def test_form_a_equals_hallerts_six_point_form(akwanga):
+    """The multipliers of case A give the closed form, an independent oracle."""
     plan = akwanga.plan
     p = np.random.default_rng(8).normal(0.0, 0.2, 6)
     width = plan.half_width * plan.projection_height / akwanga.camera.c
@@ -38,7 +38,7 @@ def test_form_a_is_hallerts_six_point_form(akwanga):
 
 
 @pytest.mark.parametrize("case", "AE")
-def test_a_form_has_a_line_for_every_point_and_leaves_the_sums_to_the_student(akwanga, case):
+def test_a_form_has_a_line_for_every_point_and_no_sums(akwanga, case):
     lines = computation_form(akwanga, case).splitlines()
     rows = [line.split() for line in lines if line[:1] in CASES[case] and "........" in line]
     assert [row[0] for row in rows] == list(CASES[case])
@@ -47,8 +47,8 @@ def test_a_form_has_a_line_for_every_point_and_leaves_the_sums_to_the_student(ak
 
 
 @given(z=st.lists(heights, min_size=5, max_size=5), d3=widths, d5=widths)
-def test_n_of_exercise_7_is_that_of_the_coefficients(z, d3, d5):
-    """A / (A - B) from the heights of 1, 3 and 5 is the over-correction of the five points, verticals given."""
+def test_n_of_exercise_7_equals_that_of_the_coefficients(z, d3, d5):
+    """A / (A - B) from the heights of 1, 3 and 5 is the over-correction of the five points for given heights."""
     b, (z2, z1, z4, z3, z5) = 195.0, z
     points = np.array([[b, 0, -z2], [0, 0, -z1], [b, d3, -z4], [0, d3, -z3], [0, -d5, -z5]]).T[..., None]
     left, right = (ProjectorPose(np.array([[x], [0.0], [0.0]]), np.zeros((3, 1))) for x in (0.0, b))
@@ -60,8 +60,8 @@ def test_n_of_exercise_7_is_that_of_the_coefficients(z, d3, d5):
 
 
 @given(times=st.floats(0.5, 4.0), needed=st.floats(1.5, 4.0))
-def test_what_a_wrong_over_correction_leaves(times, needed):
-    """|1 - n / n0| of the parallax (docs/empirical.md), whatever the drum showed."""
+def test_a_wrong_over_correction_leaves_the_predicted_parallax(times, needed):
+    """The remaining share of the parallax is |1 - n / n0| (docs/empirical.md), for any reading of the drum."""
     turn = OmegaTurn(None, before=98.3, cleared=98.5, left=98.3 + 0.2 * times, needed=needed)
     assert turn.remains == pytest.approx(abs(1.0 - times / needed), abs=1e-9)
 
@@ -74,8 +74,8 @@ def six_pointings(scenario, rng, pointing_um, sets):
     return [5000.0 + places * (7600.0 - level) / 2600.0 + noise[i] for i, level in enumerate((4900.0, 5100.0))]
 
 
-def test_the_sums_of_exercise_9_are_least_squares(akwanga):
-    """T0 from the products of what is left when the means are taken off, X0 and Z0 from T0, as its text says."""
+def test_the_sums_of_exercise_9_equal_least_squares(akwanga):
+    """T0 is computed from the products of deviations from the means, X0 and Z0 from T0, as in its text."""
     low, high = (each[..., 0] for each in six_pointings(akwanga, np.random.default_rng(9), 6.0, 1))
     d = high - low
     x, dx = low - low.mean(axis=1, keepdims=True), d - d.mean(axis=1, keepdims=True)
@@ -85,8 +85,8 @@ def test_the_sums_of_exercise_9_are_least_squares(akwanga):
     assert pytest.approx([centre.X0, centre.Y0, centre.Z0], abs=1e-6) == [X0, Y0, 4900 + 200 * T0]
 
 
-def test_tolerances_of_centres_rest_on_what_pointings_scatter_by(akwanga):
-    """The standard deviations of which tolerances are multiples are those of many sets of pointings."""
+def test_tolerances_of_centres_rest_on_the_scatter_of_pointings(akwanga):
+    """The standard deviations behind the tolerances equal those of many sets of pointings."""
     low, high = six_pointings(akwanga, np.random.default_rng(4900), 4.0, sets=4000)
     centres = perspective_centre(low, high, 4900.0, 5100.0)
     sigmas = sigmas_of_centre(akwanga, (4900.0, 5100.0), 4.0)
@@ -100,7 +100,7 @@ def sheet_of(name, folder, seed, **played):
     return {each.id: each for each in grade_folder(exercise_folder, seed, folder).marks}
 
 
-def test_the_sheet_says_how_far_omega_should_have_gone(tmp_path):
+def test_the_sheet_states_the_correct_change_of_omega(tmp_path):
     options = {"over_correction": 1.0}
     observer = {"skill": "first-order"}
     sheet = sheet_of("6", tmp_path, 6, procedure="clear the model", options=options, observer=observer)
@@ -109,15 +109,15 @@ def test_the_sheet_says_how_far_omega_should_have_gone(tmp_path):
     assert 0.4 < sheet["over-correction"].value < 0.7
 
 
-def test_the_sheet_tells_a_slip_in_the_sums_from_a_wrong_setting(tmp_path):
-    """A sum a tenth of a gon out, set as it was worked out: the sums fail and the setting does not."""
+def test_the_sheet_distinguishes_a_slip_in_the_sums_from_a_wrong_setting(tmp_path):
+    """A sum is wrong by a tenth of a gon and set as computed: the sums fail and the setting does not."""
     options = {"readings": 2, "cases": "A", "slip_gon": 0.1}
     sheet = sheet_of("8", tmp_path, 8, procedure="numerical orientation", options=options)
     assert sheet["sums-a"].value == pytest.approx(0.1, abs=0.01) and "phi' was answered as" in sheet["sums-a"].reason
     assert sheet["set"].reason == "case E was not measured completely"
 
 
-def test_the_sheet_says_when_the_centres_have_changed_places(tmp_path):
+def test_the_sheet_reports_exchanged_centres(tmp_path):
     options = {"swapped": True}
     sheet = sheet_of("9", tmp_path, 9, procedure="perspective centres", options=options)
     assert sheet["sums"].value == pytest.approx(195.0, abs=1.0)

@@ -1,4 +1,4 @@
-"""The book with a slip (exercise 14): one entry is wrong, pencil and paper find it, and what is kept back mends it."""
+"""The book with a slip (exercise 14): one entry is wrong, sums by hand find it, and the hidden value corrects it."""
 
 import csv
 import io
@@ -16,14 +16,14 @@ RIGHT = {"dove": "outside", "triangulation": "back", "diapositive": "left", "xco
 
 
 def contradictions(rows):
-    """What of a book does not come out when its sums are made again, as a student would make them."""
+    """Return the contradictions in a book found by repeating its sums, as a student would."""
     found = [
         f"{row['item']} {row['reading']}" for row in rows if RIGHT.get(row["item"], row["reading"]) != row["reading"]
     ]
     after = {}
     for round_ in ("1", "2"):
-        mine = [row for row in rows if row["round"] == round_]
-        values = {row["item"]: float(row["reading"]) for row in mine if not row["point"]}
+        rows_of_round = [row for row in rows if row["round"] == round_]
+        values = {row["item"]: float(row["reading"]) for row in rows_of_round if not row["point"]}
         for name in [item.removesuffix(" before") for item in values if item.endswith("before")]:
             off = values[f"{name} before"] + values[f"{name} correction"] - values[f"{name} after"]
             if abs((off + 200.0) % 400.0 - 200.0) > 0.001:
@@ -31,10 +31,10 @@ def contradictions(rows):
             if abs(after.get(name, values[f"{name} before"]) - values[f"{name} before"]) > 0.001:
                 found.append(f"{name} begins round {round_} otherwise than it ended")
             after[name] = values[f"{name} after"]
-        for point in {row["point"] for row in mine if row["point"]}:
-            there = [row for row in mine if row["point"] == point]
-            read = {by: [float(row["reading"]) for row in there if row["item"] == by] for by in ("by1", "by2")}
-            (mean,) = (float(row["reading"]) for row in there if row["item"] == "mean p")
+        for point in {row["point"] for row in rows_of_round if row["point"]}:
+            rows_at_point = [row for row in rows_of_round if row["point"] == point]
+            read = {by: [float(row["reading"]) for row in rows_at_point if row["item"] == by] for by in ("by1", "by2")}
+            (mean,) = (float(row["reading"]) for row in rows_at_point if row["item"] == "mean p")
             if {len(each) for each in read.values()} != {2}:
                 found.append(f"{point} has not two readings of each in round {round_}")
             elif abs((fmean(read["by1"]) - fmean(read["by2"])) / 2.0 - mean) > 0.0001:
@@ -43,7 +43,7 @@ def contradictions(rows):
 
 
 @pytest.mark.parametrize("kind", get_args(SlipKind))
-def test_every_kind_of_slip_leaves_a_contradiction_that_its_mending_removes(kind):
+def test_every_kind_of_slip_gives_a_contradiction_that_its_correction_removes(kind):
     exercise = find_exercise("14")
     for seed in (1, 2, 3):
         made = make_handout("book with a slip", scenario_for(exercise, seed), seed, {"kind": kind})
@@ -55,7 +55,7 @@ def test_every_kind_of_slip_leaves_a_contradiction_that_its_mending_removes(kind
         assert contradictions(rows) == []
 
 
-def test_seeds_draw_different_slips_and_the_same_seed_the_same_book():
+def test_different_seeds_draw_different_slips_and_the_same_seed_the_same_book():
     exercise = find_exercise("14")
     made = [make_handout("book with a slip", scenario_for(exercise, seed), seed, {}) for seed in (*range(12), 0)]
     assert len({each.hidden["kind"] for each in made}) >= 5

@@ -1,4 +1,4 @@
-"""The tutorial's book of six points is what its keys leave (issue 10)."""
+"""The observation book printed in the tutorial is that of its keys (issue 10)."""
 
 import asyncio
 import math
@@ -10,7 +10,7 @@ from tests.support.guide_pages import page
 
 
 @pytest.mark.slow
-def test_the_keys_of_the_tutorial_leave_the_book_that_stands_in_it():
+def test_the_keys_of_the_tutorial_give_its_printed_book():
     text = page("tutorial")
     book = asyncio.run(afternoon())
     assert with_book(text, book) == text, "run python -m docs.make_tutorial_pictures"

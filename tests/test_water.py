@@ -1,4 +1,4 @@
-"""Standard points under water: nobody can prick them, and every procedure goes on with what is there."""
+"""Standard points under water cannot be pricked, and every procedure continues with the other points."""
 
 import json
 from dataclasses import replace
@@ -34,17 +34,17 @@ SHORES = {
     "3 and 4": [(439900.0, 984100.0), (441000.0, 984100.0), (441000.0, 984400.0), (439900.0, 984400.0)],
     "1 and 5": [(440650.0, 984950.0), (440900.0, 984950.0), (440900.0, 985900.0), (440650.0, 985900.0)],
 }
-"""By which of the points 1 to 6 of Akwanga's first model they put under water."""
+"""Shores by the points 1 to 6 of Akwanga's first model that they put under water."""
 
 
 def flooded(name, **overrides):
-    """Akwanga's first model with a lake, every parallax read once."""
+    """Return Akwanga's first model with a lake, every parallax read once."""
     scenario = read_once(load_scenario("akwanga", overrides))
     terrain = msgspec.structs.replace(scenario.terrain, water=[Water(shore=SHORES[name])])
     return msgspec.structs.replace(scenario, terrain=terrain, models=scenario.models[:1])
 
 
-def worked_alone(scenario, seed=1):
+def measure_first_model(scenario, seed=1):
     session = open_session(scenario, seed)
     return next(iter(measure_models(session.person, session.job))), session.person
 
@@ -52,7 +52,7 @@ def worked_alone(scenario, seed=1):
 # --- the scene ------------------------------------------------------------------------------------------
 
 
-def test_nothing_in_the_water_is_pricked_and_all_else_is_as_without_it():
+def test_no_point_in_the_water_is_pricked_and_all_others_are_unchanged():
     wet, dry = (build_scene(load_scenario(name), 7) for name in (LAKE, "akwanga"))
     assert set(dry.standard_points["1"]) - set(wet.standard_points["1"]) == {"6"}
     assert set(dry.standard_points["2"]) - set(wet.standard_points["2"]) == {"5"}
@@ -63,7 +63,7 @@ def test_nothing_in_the_water_is_pricked_and_all_else_is_as_without_it():
                 np.testing.assert_array_equal(marks.get(point), without.get(point))
 
 
-def test_a_flooded_signal_is_not_seen_either():
+def test_a_flooded_signal_is_not_visible():
     scenario = load_scenario(LAKE)
     c3 = next(point for point in scenario.ground if point.point == "C3")
     around = [(c3.X + east, c3.Y + north) for east, north in ((-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0))]
@@ -73,7 +73,7 @@ def test_a_flooded_signal_is_not_seen_either():
     assert photographs["102"].points.get("1025") is not None
 
 
-def test_the_picture_of_water_shows_nothing_but_grain_and_that_of_land_is_not_touched():
+def test_the_picture_of_water_shows_only_grain_and_that_of_land_is_unchanged():
     wet, dry = (build_scene(load_scenario(name), 7) for name in (LAKE, "akwanga"))
     middle = dry.photographs["102"].points.get("1025")
     around = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, 21), np.linspace(-1.0, 1.0, 21))) + middle[:, None, None]
@@ -88,7 +88,7 @@ def test_the_picture_of_water_shows_nothing_but_grain_and_that_of_land_is_not_to
 
 
 def test_a_bay_of_the_lake_is_land():
-    """A horseshoe: the land between its arms is dry, both arms are wet."""
+    """The shore is a horseshoe: the land between its arms is dry, both arms are wet."""
     horseshoe = [
         (0.0, 0.0),
         (30.0, 0.0),
@@ -117,7 +117,7 @@ def test_a_bay_of_the_lake_is_land():
         *(("1234", False), ("1246", False), ("12def", False), ("1abc", False), ("", False)),
     ],
 )
-def test_five_elements_ask_for_three_rows_and_two_points_in_two_of_them(positions, determined):
+def test_five_elements_require_three_rows_and_two_points_in_two_of_them(positions, determined):
     assert determine_orientation(positions) is determined
 
 
@@ -125,7 +125,7 @@ def test_five_elements_ask_for_three_rows_and_two_points_in_two_of_them(position
 
 
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
-def test_a_strip_with_a_corner_under_water_is_worked_to_its_end_at_the_door(procedure, finished):
+def test_a_strip_with_a_corner_under_water_is_completed_over_the_link(procedure, finished):
     out, result = finished("akwanga-lake empirical" if procedure == "empirical" else "akwanga-lake", 7)
     document = json.loads((out / "results.json").read_text())
     assert document["status"] == "complete"
@@ -145,14 +145,14 @@ def test_a_strip_with_a_corner_under_water_is_worked_to_its_end_at_the_door(proc
 
 
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
-def test_a_crowd_does_without_the_same_points(procedure):
+def test_a_batch_omits_the_same_points(procedure):
     scenario = read_once(load_scenario(LAKE, {"plan.procedure": f'"{procedure}"'}))
     assert same_to_the_digit(msgspec.structs.replace(scenario, models=scenario.models[:1]), (2, 3), all_finish=True)
 
 
 @pytest.mark.parametrize("procedure", ["numerical", "empirical"])
-def test_a_point_that_only_some_of_a_crowd_find_on_their_prints_is_used_by_these(procedure):
-    """At 101.25 mm point 5 lies on the edge of the picture: some films have shrunk so far that they show it."""
+def test_a_point_on_the_prints_of_some_sessions_of_a_batch_is_used_by_these(procedure):
+    """At 101.25 mm point 5 is on the edge of the picture: only a film with enough shrinkage shows it."""
     scenario = read_once(
         load_scenario(
             "akwanga",
@@ -168,8 +168,8 @@ def test_a_point_that_only_some_of_a_crowd_find_on_their_prints_is_used_by_these
     assert same_to_the_digit(scenario, (2, 3), all_finish=True)
 
 
-def test_with_point_1_under_water_the_counters_are_preset_elsewhere_and_the_book_says_where():
-    record, person = worked_alone(flooded("1"))
+def test_with_point_1_under_water_the_counters_are_preset_at_another_point_named_in_the_book():
+    record, person = measure_first_model(flooded("1"))
     assert set(record.orientation.residuals) == set(CASES["E"]) - {"1"}
     assert record.points["1021"] == pytest.approx((5000.0, 5000.0, 5000.0), abs=15.0)
     assert "1: there is no point 1: counters preset at 1021, point 2" in person.book.remarks
@@ -196,29 +196,29 @@ def test_with_point_1_under_water_the_counters_are_preset_elsewhere_and_the_book
         ),
     ],
 )
-def test_too_little_left_is_one_sentence(shore, overrides, sentence):
-    with pytest.raises(OperatorGaveUp) as said:
-        worked_alone(flooded(shore, **overrides))
-    assert str(said.value).startswith(sentence)
+def test_the_error_message_for_too_few_points_is_one_sentence(shore, overrides, sentence):
+    with pytest.raises(OperatorGaveUp) as raised:
+        measure_first_model(flooded(shore, **overrides))
+    assert str(raised.value).startswith(sentence)
 
 
-def test_with_all_under_water_there_is_nowhere_to_begin():
+def test_with_all_points_under_water_the_operator_gives_up():
     scenario = flooded("1")
     everywhere = [(4e5, 9e5), (5e5, 9e5), (5e5, 1.1e6), (4e5, 1.1e6)]
     terrain = msgspec.structs.replace(scenario.terrain, water=[Water(shore=everywhere)])
     with pytest.raises(OperatorGaveUp, match="1: no point is pricked on both the prints of 101 and 102"):
-        worked_alone(msgspec.structs.replace(scenario, terrain=terrain))
+        measure_first_model(msgspec.structs.replace(scenario, terrain=terrain))
 
 
-def test_the_points_in_between_determine_what_is_left_of_the_corners():
-    record, _ = worked_alone(flooded("1 and 5", **{"plan.case": '"E"'}))
+def test_the_points_in_between_determine_a_model_without_corners():
+    record, _ = measure_first_model(flooded("1 and 5", **{"plan.case": '"E"'}))
     assert set(record.orientation.rounds[0].parallaxes) == set(CASES["E"]) - {"1", "5"}
     assert record.orientation.rms < 0.03
 
 
-def test_a_closed_form_that_lacks_a_point_says_so():
+def test_a_closed_form_without_one_of_its_points_is_replaced_by_least_squares():
     scenario = read_once(load_scenario(LAKE, {"plan.solution": '"hallert"'}))
-    record, person = worked_alone(scenario)
+    record, person = measure_first_model(scenario)
     assert "1: no closed form for the points 1 2 3 4 5, so by least squares" in person.book.remarks
     assert record.orientation.rms < 0.03
 
@@ -226,7 +226,7 @@ def test_a_closed_form_that_lacks_a_point_says_so():
 # --- compilation ----------------------------------------------------------------------------------------
 
 
-def test_a_model_without_a_corner_has_the_border_of_the_others():
+def test_a_model_without_a_corner_has_the_border_of_the_other_points():
     places = {"P3": (0.0, 9.0, 0.0), "P4": (8.0, 10.0, 0.0), "P5": (1.0, -7.0, 0.0), "P6": (7.0, -9.0, 0.0)}
     points = {label: f"P{label}" for label in "3456"}
     every, without = Area.within(points, places), Area.within({**points, "6": "not there"}, places)
@@ -235,12 +235,12 @@ def test_a_model_without_a_corner_has_the_border_of_the_others():
 
 
 SPACING = 4.0
-"""Of spot heights, mm in the model."""
+"""Spacing of spot heights, mm in the model."""
 
 
 @pytest.mark.slow
-def test_on_water_no_spot_is_set_and_no_contour_followed():
-    """Contours end within 4 m of the shore, half of what is looked at most closely for a match; spots stand on land."""
+def test_on_water_no_spot_is_set_and_no_contour_is_traced():
+    """Contours end within 4 m of the shore, half of the smallest patch of a match; spots are on land."""
     scenario = without_errors(load_scenario(LAKE))
     session = open_session(scenario, 1)
     person = session.person
