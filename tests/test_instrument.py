@@ -186,7 +186,7 @@ def test_a_point_beyond_the_field_of_view_is_not_seen():
     a7.turn_handwheel("X", 0.5)
     assert a7.eyepiece(1, "P") is None
     assert a7.stereo("P") is None
-    assert a7.eyepiece(1, "nobody") is None
+    assert a7.eyepiece(1, "unknown") is None
 
 
 # --- fittings ------------------------------------------------------------------------------------------

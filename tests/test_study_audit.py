@@ -15,7 +15,7 @@ from a7sim.study.tally import Tally
 AT_THE_PLOTTER = {
     "schema_version": 1,
     "title": "As it stands",
-    "question": "What does a model come to?",
+    "question": "How long does a model take?",
     "scenario": "akwanga",
     "replicates": 1,
     "responses": ["hours"],
